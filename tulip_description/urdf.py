@@ -1,0 +1,96 @@
+"""The robot as URDF text."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+from tulip_description import frames
+from tulip_description.robot import Box, Link, Robot, Vector
+
+COLOURS: dict[str, tuple[float, float, float]] = {
+    "grey": (0.72, 0.72, 0.74),
+    "black": (0.08, 0.08, 0.09),
+    "cyan": (0.0, 0.75, 0.85),
+    "magenta": (0.85, 0.1, 0.65),
+}
+"""Red, green and blue, 0 to 1, of the colour names of `Box`."""
+
+
+def build_urdf(robot: Robot, marker: str = "magenta", mount_frames: bool = True) -> str:
+    """Return the robot as URDF.
+
+    Args:
+        robot: What to describe.
+        marker: Colour of the team marker: "cyan" or "magenta".
+        mount_frames: Whether soles, IMU and camera appear as links without mass, as tf and viewers want them. A physics
+            engine is better off without: pybullet gives a link without inertia a mass of 1 kg.
+
+    Raises:
+        ValueError: if the marker's colour is unknown.
+    """
+    if marker not in ("cyan", "magenta"):
+        raise ValueError(f"marker is {marker!r}; expected cyan or magenta")
+    root = ElementTree.Element("robot", name="tulip")
+    for link in robot.links:
+        _add_link(root, link, marker)
+    for joint in robot.joints:
+        element = _add_joint(
+            root, joint.name, "fixed" if joint.fixed else "revolute", joint.parent, joint.child, joint.origin
+        )
+        if not joint.fixed:
+            ElementTree.SubElement(element, "axis", xyz=_text(joint.axis))
+            limits = {"lower": joint.lower, "upper": joint.upper, "effort": joint.effort, "velocity": joint.velocity}
+            ElementTree.SubElement(element, "limit", {key: repr(value) for key, value in limits.items()})
+            ElementTree.SubElement(element, "dynamics", damping="0", friction="0")
+    if mount_frames:
+        mounts = [(frames.LEFT_SOLE, robot.soles[0]), (frames.RIGHT_SOLE, robot.soles[1]), (frames.IMU, robot.imu)]
+        if robot.camera is not None:
+            mounts.append((frames.CAMERA, robot.camera))
+        for name, mount in mounts:
+            ElementTree.SubElement(root, "link", name=name)
+            _add_joint(root, f"{name}_mount", "fixed", mount.link, name, mount.origin)
+        if robot.camera is not None:
+            ElementTree.SubElement(root, "link", name=frames.CAMERA_OPTICAL)
+            turn = "-1.5707963267948966 0 -1.5707963267948966"  # z forward, x right, y down (REP 103)
+            _add_joint(
+                root, "camera_optical_mount", "fixed", frames.CAMERA, frames.CAMERA_OPTICAL, (0.0, 0.0, 0.0), turn
+            )
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _add_link(root: ElementTree.Element, link: Link, marker: str) -> None:
+    element = ElementTree.SubElement(root, "link", name=link.name)
+    inertial = ElementTree.SubElement(element, "inertial")
+    ElementTree.SubElement(inertial, "origin", xyz=_text(link.com), rpy="0 0 0")
+    ElementTree.SubElement(inertial, "mass", value=repr(link.mass))
+    ixx, iyy, izz = (repr(value) for value in link.inertia)
+    ElementTree.SubElement(inertial, "inertia", ixx=ixx, iyy=iyy, izz=izz, ixy="0", ixz="0", iyz="0")
+    for box in link.boxes:
+        colour = marker if box.colour == "marker" else box.colour
+        visual = _add_box(element, "visual", box)
+        material = ElementTree.SubElement(visual, "material", name=colour)
+        ElementTree.SubElement(material, "color", rgba=_text(COLOURS[colour]) + " 1")
+        if box.collides:
+            _add_box(element, "collision", box)
+
+
+def _add_box(link: ElementTree.Element, kind: str, box: Box) -> ElementTree.Element:
+    element = ElementTree.SubElement(link, kind)
+    ElementTree.SubElement(element, "origin", xyz=_text(box.centre), rpy="0 0 0")
+    ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), "box", size=_text(box.size))
+    return element
+
+
+def _add_joint(
+    root: ElementTree.Element, name: str, kind: str, parent: str, child: str, origin: Vector, rpy: str = "0 0 0"
+) -> ElementTree.Element:
+    element = ElementTree.SubElement(root, "joint", name=name, type=kind)
+    ElementTree.SubElement(element, "parent", link=parent)
+    ElementTree.SubElement(element, "child", link=child)
+    ElementTree.SubElement(element, "origin", xyz=_text(origin), rpy=rpy)
+    return element
+
+
+def _text(vector: tuple[float, ...]) -> str:
+    return " ".join(repr(value) for value in vector)

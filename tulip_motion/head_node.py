@@ -1,0 +1,85 @@
+"""Head movement as a node: head_command and joint_states in, commands to the two head joints out."""
+
+from __future__ import annotations
+
+import numpy as np
+from sensor_msgs.msg import JointState
+
+from tulip_description.robot import HEAD_JOINTS, load_robot
+from tulip_description.robot_io import JointCommand
+from tulip_motion.head import HeadMovement, HeadParameters
+from tulip_motion.interface import HeadCommand, HeadMode
+from tulip_msgs.msg import HeadCommand as HeadCommandMessage
+from tulip_msgs.msg import JointCommand as JointCommandMessage
+from tulip_ros import topics
+from tulip_ros.run import ComponentNode, run
+from tulip_ros.time import header, stamp_of
+
+PERIOD = 20_000_000  # [ns] between two commands: 50 Hz is fast for a head
+
+
+class HeadNode(ComponentNode):
+    """Turns messages into calls of head movement and its answers into messages."""
+
+    def __init__(self) -> None:
+        """Make the core and connect it."""
+        super().__init__("head")
+        self._parameters = self.load(HeadParameters())
+        self._head = HeadMovement(self._parameters, load_robot())
+        self._command = HeadCommand(0, HeadMode.HOLD)
+        self._last = -PERIOD  # stamp of the joint state answered last [ns]
+        self._publisher = self.sender(topics.HEAD_JOINT_COMMAND)
+        self.listen(topics.HEAD_COMMAND, self._on_command)
+        self.listen(topics.JOINT_STATES, self._on_joints)
+
+    def _on_command(self, message: HeadCommandMessage) -> None:
+        self._command = head_command_from(message)
+
+    def _on_joints(self, message: JointState) -> None:
+        stamp = stamp_of(message)
+        if 0 <= stamp - self._last < PERIOD:
+            return
+        self._last = stamp
+        positions = dict(zip(message.name, message.position, strict=True))
+        missing = [name for name in HEAD_JOINTS if name not in positions]
+        if missing:
+            self.get_logger().error(
+                f"joint_states lacks {', '.join(missing)}; expected the 14 joints of the playing robot",
+                throttle_duration_sec=5.0,
+            )
+            return
+        angles = np.array([positions[name] for name in HEAD_JOINTS])
+        self._publisher.publish(joint_command_message(self._head.update(stamp, self._command, angles)))
+
+
+def head_command_from(message: HeadCommandMessage) -> HeadCommand:
+    """Return the head command of a message."""
+    x, y, z = (float(value) for value in message.target)
+    glance = None
+    if message.has_glance:
+        gx, gy, gz = (float(value) for value in message.glance)
+        glance = (gx, gy, gz)
+    return HeadCommand(stamp_of(message), HeadMode(message.mode), (x, y, z), glance)
+
+
+def joint_command_message(command: JointCommand) -> JointCommandMessage:
+    """Return a joint command as a message."""
+    return JointCommandMessage(
+        header=header(command.stamp),
+        sequence=command.sequence,
+        names=list(command.names),
+        position=command.position.tolist(),
+        velocity=command.velocity.tolist(),
+        effort=command.effort.tolist(),
+        stiffness=command.stiffness.tolist(),
+        damping=command.damping.tolist(),
+    )
+
+
+def main() -> None:
+    """Run the node."""
+    run(HeadNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,179 @@
+"""What motion control takes and gives: commands, odometry and the state of the legs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class WalkMode(IntEnum):
+    """What the legs shall do."""
+
+    LIMP = 0
+    """No stiffness, a little damping."""
+    STAND = 1
+    """Stop walking and stand."""
+    WALK = 2
+    """Walk with the commanded velocity; zero velocity steps in place."""
+
+
+@dataclass(frozen=True)
+class WalkCommand:
+    """Velocity command for the legs.
+
+    Attributes:
+        stamp: Stamp of the newest input used [ns].
+        mode: See `WalkMode`.
+        velocity: (3,) forward [m/s], left [m/s] and turning rate [rad/s], of base_footprint in itself.
+    """
+
+    stamp: int
+    mode: WalkMode
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class Side(IntEnum):
+    """A leg; also the row of that foot in arrays."""
+
+    LEFT = 0
+    RIGHT = 1
+
+    @property
+    def other(self) -> Side:
+        return Side.RIGHT if self is Side.LEFT else Side.LEFT
+
+
+@dataclass(frozen=True)
+class KickGoal:
+    """Goal of the Kick action.
+
+    Attributes:
+        side: The foot that kicks.
+        direction: Where the ball shall go, in base_footprint [rad], 0 forward.
+        speed: Wanted speed of the foot at the ball [m/s].
+    """
+
+    side: Side
+    direction: float = 0.0
+    speed: float = 3.0
+
+
+class MotionMode(IntEnum):
+    """What motion control does at present."""
+
+    LIMP = 0
+    STAND = 1
+    WALK = 2
+    KICK = 3
+    FALLEN = 4
+    """A fall was detected: the legs are limp until the robot is upright and told to stand."""
+
+
+class Support(IntEnum):
+    """Which feet carry the robot."""
+
+    DOUBLE = 0
+    LEFT = 1
+    RIGHT = 2
+    NONE = 3
+
+
+@dataclass(frozen=True)
+class Odometry:
+    """Dead reckoning from legs and IMU.
+
+    Attributes:
+        stamp: [ns].
+        position: (3,) of base_link in odom [m]; z is the height above the ground.
+        orientation: (4,) quaternion x, y, z, w of base_link in odom.
+        linear_velocity: (3,) of base_link, in base_footprint axes [m/s].
+        angular_velocity: (3,) of base_link, in base_link axes [rad/s].
+        distance: Path length walked since the start [m].
+    """
+
+    stamp: int
+    position: Array
+    orientation: Array
+    linear_velocity: Array
+    angular_velocity: Array
+    distance: float
+
+
+@dataclass(frozen=True)
+class MotionState:
+    """Everything about the legs that others may want to see. Arrays of 12 follow LEG_JOINTS.
+
+    Attributes:
+        stamp: [ns].
+        mode: See `MotionMode`.
+        support: Planned support.
+        phase: Progress of the present step or kick, 0 to 1.
+        step_count: Steps begun since the start.
+        com, com_desired: (3,) CoM in odom [m].
+        com_velocity, com_velocity_desired: (3,) [m/s] in odom.
+        dcm, dcm_desired: (2,) divergent component of motion in odom [m].
+        zmp, zmp_desired: (2,) measured CoP and commanded ZMP in odom [m]; measured is NaN without contact.
+        soles: (2, 4, 4) transforms of l_sole and r_sole in odom.
+        joint_positions, joint_positions_desired: (12,) [rad].
+        joint_velocities, joint_velocities_desired: (12,) [rad/s].
+        torque_feedback, torque_feedforward, torque_learned: (12,) parts of eq. (12) [N m].
+        reason: Why the mode is what it is, in words (fall, refused kick, clipped command), or "".
+    """
+
+    stamp: int
+    mode: MotionMode
+    support: Support
+    phase: float
+    step_count: int
+    com: Array
+    com_desired: Array
+    com_velocity: Array
+    com_velocity_desired: Array
+    dcm: Array
+    dcm_desired: Array
+    zmp: Array
+    zmp_desired: Array
+    soles: Array
+    joint_positions: Array
+    joint_positions_desired: Array
+    joint_velocities: Array
+    joint_velocities_desired: Array
+    torque_feedback: Array
+    torque_feedforward: Array
+    torque_learned: Array = field(default_factory=lambda: np.zeros(12))
+    reason: str = ""
+
+
+class HeadMode(IntEnum):
+    """What the head shall do."""
+
+    HOLD = 0
+    """Keep the present angles."""
+    SEARCH = 1
+    """Sweep over the whole field round the robot."""
+    LOOK_AT = 2
+    """Look at `target` and stay on it."""
+    TRACK = 3
+    """Look at `target`, with short glances at `glance` every few seconds."""
+
+
+@dataclass(frozen=True)
+class HeadCommand:
+    """What the head shall look at.
+
+    Attributes:
+        stamp: Stamp of the newest input used [ns].
+        mode: See `HeadMode`.
+        target: (3,) point in base_footprint [m] for LOOK_AT and TRACK.
+        glance: (3,) point in base_footprint [m] for the glances of TRACK, or None for no glances.
+    """
+
+    stamp: int
+    mode: HeadMode
+    target: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    glance: tuple[float, float, float] | None = None

@@ -1,0 +1,38 @@
+"""Joint feedback, eq. (13): which gains hold which leg."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tulip_motion.interface import Side, Support
+from tulip_motion.parameters import MotionParameters
+
+Array = NDArray[np.float64]
+
+
+class JointGains:
+    """K_P and K_D of eq. (13) for each phase: stiff legs carry, a soft one swings."""
+
+    def __init__(self, parameters: MotionParameters) -> None:
+        """Lay the gains of both legs out once, as they are needed every tick."""
+        p = parameters
+        stance = np.array([p.stance_stiffness, p.stance_damping])
+        swing = np.array([p.swing_stiffness, p.swing_damping])
+        self._of_support = {
+            Support.DOUBLE: np.hstack([stance, stance]),
+            Support.LEFT: np.hstack([stance, swing]),
+            Support.RIGHT: np.hstack([swing, stance]),
+        }
+        self.limp: tuple[Array, Array] = (np.zeros(12), np.tile(np.array(p.limp_damping), len(Side)))
+
+    def of(self, support: Support) -> tuple[Array, Array]:
+        """Return (12,) stiffness [N m/rad] and (12,) damping [N m s/rad] for a support."""
+        gains = self._of_support[support]
+        return gains[0], gains[1]
+
+
+def feedback(stiffness: Array, damping: Array, error: Array, error_rate: Array) -> Array:
+    """Return tau_fb = K_P e + K_D e' [N m], eq. (13)."""
+    result: Array = stiffness * error + damping * error_rate
+    return result
