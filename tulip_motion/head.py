@@ -136,7 +136,8 @@ class HeadMovement:
         above = offset[2] - self._tilt_axis[2]
         distance = max(math.hypot(ahead, above), abs(float(self._camera[2])), 1e-6)
         tilt = math.asin(float(self._camera[2]) / distance) - math.atan2(above, ahead)
-        return np.clip(np.array([pan, tilt]), self._lower, self._upper)
+        angles: Array = np.clip(np.array([pan, tilt]), self._lower, self._upper)
+        return angles
 
     def _begin(self, stamp: int, command: HeadCommand) -> None:
         """Begin a mode."""

@@ -1,4 +1,4 @@
-"""Head movement as a node: head_command and joint_states in, commands to the two head joints out."""
+"""Node "head": head_command and joint_states in, commands to the two head joints out."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ import numpy as np
 from sensor_msgs.msg import JointState
 
 from tulip_description.robot import HEAD_JOINTS, load_robot
-from tulip_description.robot_io import JointCommand
 from tulip_motion.head import HeadMovement, HeadParameters
 from tulip_motion.interface import HeadCommand, HeadMode
+from tulip_motion.messages import head_command_from_message, joint_command_to_message
 from tulip_msgs.msg import HeadCommand as HeadCommandMessage
-from tulip_msgs.msg import JointCommand as JointCommandMessage
 from tulip_ros import topics
 from tulip_ros.run import ComponentNode, run
-from tulip_ros.time import header, stamp_of
+from tulip_ros.time import stamp_of
 
 PERIOD = 20_000_000  # [ns] between two commands: 50 Hz is fast for a head
 
@@ -33,7 +32,7 @@ class HeadNode(ComponentNode):
         self.listen(topics.JOINT_STATES, self._on_joints)
 
     def _on_command(self, message: HeadCommandMessage) -> None:
-        self._command = head_command_from(message)
+        self._command = head_command_from_message(message)
 
     def _on_joints(self, message: JointState) -> None:
         stamp = stamp_of(message)
@@ -43,37 +42,13 @@ class HeadNode(ComponentNode):
         positions = dict(zip(message.name, message.position, strict=True))
         missing = [name for name in HEAD_JOINTS if name not in positions]
         if missing:
-            self.get_logger().error(
+            self.health.count(
+                "joint states without head",
                 f"joint_states lacks {', '.join(missing)}; expected the 14 joints of the playing robot",
-                throttle_duration_sec=5.0,
             )
             return
         angles = np.array([positions[name] for name in HEAD_JOINTS])
-        self._publisher.publish(joint_command_message(self._head.update(stamp, self._command, angles)))
-
-
-def head_command_from(message: HeadCommandMessage) -> HeadCommand:
-    """Return the head command of a message."""
-    x, y, z = (float(value) for value in message.target)
-    glance = None
-    if message.has_glance:
-        gx, gy, gz = (float(value) for value in message.glance)
-        glance = (gx, gy, gz)
-    return HeadCommand(stamp_of(message), HeadMode(message.mode), (x, y, z), glance)
-
-
-def joint_command_message(command: JointCommand) -> JointCommandMessage:
-    """Return a joint command as a message."""
-    return JointCommandMessage(
-        header=header(command.stamp),
-        sequence=command.sequence,
-        names=list(command.names),
-        position=command.position.tolist(),
-        velocity=command.velocity.tolist(),
-        effort=command.effort.tolist(),
-        stiffness=command.stiffness.tolist(),
-        damping=command.damping.tolist(),
-    )
+        self._publisher.publish(joint_command_to_message(self._head.update(stamp, self._command, angles)))
 
 
 def main() -> None:

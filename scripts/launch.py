@@ -1,0 +1,77 @@
+"""Start the robot's nodes, each a process, and show how they are until Ctrl-C."""
+
+from __future__ import annotations
+
+import _environment
+
+if __name__ == "__main__":
+    _environment.prepare()
+
+import signal
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.live import Live
+
+from tulip_ros import plan
+from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
+from tulip_ros.launch import Launcher
+from tulip_ros.monitor import Monitor
+from tulip_ros.nodes import ROBOT
+from tulip_ros.run import ComponentNode, session
+
+LOOK = 0.2  # [s] between two looks at the processes
+
+
+def main(
+    nodes: Annotated[
+        list[str] | None, typer.Argument(help=f"Nodes to start; none: the robot. {plan.known_names()}")
+    ] = None,
+    driver: Annotated[str, typer.Option(help="What stands for the body; 'none' for no driver.")] = "sim",
+    namespace: Annotated[str, typer.Option(help="Namespace of the robot, as in 'striker'.")] = "",
+    parameters: Annotated[list[Path] | None, typer.Option(help="YAML file `node: {name: value}`; repeatable.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Record all topics into this new folder.")] = None,
+    transport: Annotated[str, typer.Option(help="auto, shared_memory or udp")] = "auto",
+    logs: Annotated[Path | None, typer.Option(help="Folder for one log file a node.")] = None,
+) -> None:
+    """Start nodes and keep them running."""
+    try:
+        names = list(nodes or ROBOT) + (["recorder"] if record else [])
+        values = {"recorder": {"path": str(record.absolute())}} if record else {}
+        starts = plan.make_plan(names, None if driver == "none" else driver, namespace, parameters or (), values)
+        keep_running(Launcher(starts, logs, transport), namespace)
+    except (BadInputError, ValueError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise typer.Exit(EXIT_BAD_INPUT) from None
+
+
+def keep_running(launcher: Launcher, namespace: str) -> None:
+    """Run the nodes until Ctrl-C or SIGTERM; on a terminal with a table, else with a line for each event."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    console = Console(stderr=True)
+    console.print(f"logs: {launcher.log_folder}", highlight=False, soft_wrap=True)
+    try:
+        with (
+            launcher,
+            session(lambda: ComponentNode("launcher", namespace=namespace), arguments=[], handle_signals=False) as (
+                node,
+                spin,
+            ),
+            Live(console=console, auto_refresh=False, transient=False) as live,
+        ):
+            monitor = Monitor(node)
+            while True:
+                spin(LOOK)
+                for line in launcher.poll():
+                    console.print(line, highlight=False, markup=False, soft_wrap=True)
+                if console.is_terminal:
+                    live.update(monitor.table(launcher.states()), refresh=True)
+    except KeyboardInterrupt:
+        console.print("all nodes ended", highlight=False)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,43 @@
+"""Record the topics of a running graph into MCAP until Ctrl-C."""
+
+from __future__ import annotations
+
+import _environment
+
+if __name__ == "__main__":
+    _environment.prepare()
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tulip_ros.errors import EXIT_BAD_INPUT
+from tulip_ros.recorder_node import RecorderNode, RecorderParameters
+from tulip_ros.run import run
+
+
+def main(
+    path: Annotated[Path | None, typer.Argument(help="New folder for the recording; none: recordings/DATE.")] = None,
+    include: Annotated[
+        list[str] | None, typer.Option(help="Regular expression of whole topic names; repeatable.")
+    ] = None,
+    exclude: Annotated[
+        list[str] | None, typer.Option(help="Regular expression of whole topic names; repeatable.")
+    ] = None,
+    namespace: Annotated[str, typer.Option(help="Namespace of the robot, as in 'striker'.")] = "",
+) -> None:
+    """Record all topics, or those that match."""
+    try:
+        settings = RecorderParameters(
+            path=str(path) if path else "", include=tuple(include or ()), exclude=tuple(exclude or ())
+        )
+    except ValueError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise typer.Exit(EXIT_BAD_INPUT) from None
+    run(lambda: RecorderNode(settings, namespace), arguments=[])
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,190 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tulip_description.camera_pose import camera_in_footprint
+from tulip_description.posture import standing_posture
+from tulip_description.robot import HEAD_JOINTS, load_robot
+from tulip_description.robot_io import JointCommand
+from tulip_motion.head import HeadMovement, HeadParameters
+from tulip_motion.interface import HeadCommand, HeadMode
+
+ROBOT = load_robot()
+PERIOD = 20_000_000
+BASE_HEIGHT = standing_posture(ROBOT).base_height
+LOWER, UPPER = (ROBOT.position_limits[row, -2:] for row in (0, 1))
+HALF_WIDTH, HALF_HEIGHT = math.radians(30.0), math.radians(23.0)
+
+
+def off_axis(angles: np.ndarray, target: tuple[float, float, float]) -> float:
+    """Return the angle between the optical axis and a target [rad]."""
+    transform = camera_in_footprint(ROBOT, BASE_HEIGHT, (0.0, 0.0, 0.0, 1.0), angles[0], angles[1])
+    x, y, z = transform[:3, :3].T @ (np.array(target) - transform[:3, 3])
+    return math.atan2(math.hypot(x, y), z)
+
+
+def drive(
+    head: HeadMovement, command: HeadCommand, seconds: float, start: np.ndarray | None = None
+) -> list[JointCommand]:
+    """Run a head whose joints follow their commands one period later."""
+    angles = np.zeros(2) if start is None else start
+    commands = []
+    for tick in range(round(seconds * 1e9 / PERIOD)):
+        commands.append(head.update(10**9 + tick * PERIOD, command, angles))
+        angles = commands[-1].position
+    return commands
+
+
+def test_target_is_centred_within_a_tenth_of_a_degree_when_settled() -> None:
+    for target in [(1.0, 0.0, 0.0), (0.5, 0.2, 0.09), (5.0, -3.0, 0.0), (-0.5, 1.5, 0.0), (3.0, 0.0, 1.8)]:
+        head = HeadMovement(HeadParameters(), ROBOT)
+        last = drive(head, HeadCommand(0, HeadMode.LOOK_AT, target), 2.0)[-1]
+        assert off_axis(last.position, target) < math.radians(0.1), target
+        assert np.allclose(last.velocity, 0.0, atol=1e-6)
+
+
+def test_commands_name_the_head_joints_and_carry_their_gains() -> None:
+    parameters = HeadParameters(stiffness=12.0, damping=0.3)
+    commands = drive(HeadMovement(parameters, ROBOT), HeadCommand(0, HeadMode.HOLD), 0.1)
+    assert [command.sequence for command in commands] == [1, 2, 3, 4, 5]
+    assert commands[0].names == HEAD_JOINTS
+    assert commands[0].stiffness.tolist() == [12.0, 12.0]
+    assert commands[0].damping.tolist() == [0.3, 0.3]
+
+
+modes = st.sampled_from(list(HeadMode))
+points = st.tuples(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0), st.floats(-0.5, 2.5))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    commands=st.lists(
+        st.tuples(modes, points, st.one_of(st.none(), points), st.integers(1, 60)), min_size=1, max_size=6
+    ),
+    start=st.tuples(st.floats(-2.4, 2.4), st.floats(-0.7, 1.3)),
+)
+def test_position_speed_and_acceleration_stay_inside_limits_whatever_is_commanded(commands, start) -> None:
+    parameters = HeadParameters()
+    head = HeadMovement(parameters, ROBOT)
+    angles, stamp, last = np.array(start), 0, None
+    for mode, target, glance, count in commands:
+        for _ in range(count):
+            stamp += PERIOD
+            command = head.update(stamp, HeadCommand(stamp, mode, target, glance), angles)
+            assert np.all(command.position >= LOWER) and np.all(command.position <= UPPER)
+            assert np.all(np.abs(command.velocity) <= parameters.speed + 1e-9)
+            if last is not None:
+                step = command.velocity - last.velocity
+                assert np.all(np.abs(step) <= parameters.acceleration * PERIOD * 1e-9 + 1e-9)
+                moved = command.position - last.position
+                assert np.allclose(moved, command.velocity * PERIOD * 1e-9, atol=1e-9)  # nothing was cut off at a limit
+            angles, last = command.position, command
+
+
+def test_target_out_of_reach_is_looked_at_from_the_joint_limit() -> None:
+    behind = (-3.0, 0.1, 0.0)
+    last = drive(HeadMovement(HeadParameters(), ROBOT), HeadCommand(0, HeadMode.LOOK_AT, behind), 3.0)[-1]
+    assert last.position[0] == pytest.approx(UPPER[0] - HeadParameters().limit_margin)
+
+
+def test_tracking_glances_every_three_seconds_for_less_than_a_second_and_returns() -> None:
+    ball, goal = (1.0, 0.3, 0.09), (3.0, -2.0, 0.0)
+    commands = drive(HeadMovement(HeadParameters(), ROBOT), HeadCommand(0, HeadMode.TRACK, ball, goal), 12.0)
+    times = np.arange(len(commands)) * PERIOD * 1e-9
+    on_goal = np.array([off_axis(command.position, goal) < math.radians(2.0) for command in commands])
+    on_ball = np.array([off_axis(command.position, ball) < math.radians(1.0) for command in commands])
+    begins = times[1:][on_goal[1:] & ~on_goal[:-1]]
+    assert len(begins) == 3
+    assert np.all(np.abs(np.diff(begins) - 3.7) < 0.1)  # glance_period and glance_length
+    assert 0.1 < on_goal.sum() * PERIOD * 1e-9 / 3 < 0.7
+    assert on_ball.mean() > 0.6
+    assert on_ball[-1]
+
+
+def test_tracking_without_glance_stays_on_the_target() -> None:
+    ball = (1.0, 0.3, 0.09)
+    commands = drive(HeadMovement(HeadParameters(), ROBOT), HeadCommand(0, HeadMode.TRACK, ball), 8.0)
+    assert all(off_axis(command.position, ball) < math.radians(1.0) for command in commands[50:])
+
+
+def covered(commands: list[JointCommand]) -> dict[tuple[float, float], bool]:
+    """Return which places (azimuth [rad], range [m]) were in the picture of a camera of 60 x 46 degrees."""
+    places = [
+        (azimuth, reach) for azimuth in np.radians(np.arange(-160.0, 161.0, 10.0)) for reach in (0.5, 1, 2, 3, 5, 7)
+    ]
+    seen = dict.fromkeys(places, False)
+    points = np.array([[reach * math.cos(azimuth), reach * math.sin(azimuth), 0.0] for azimuth, reach in places])
+    for command in commands[::4]:
+        transform = camera_in_footprint(ROBOT, BASE_HEIGHT, (0.0, 0.0, 0.0, 1.0), *command.position)
+        optical = (points - transform[:3, 3]) @ transform[:3, :3]
+        inside = (optical[:, 2] > 0.0) & (np.abs(optical[:, 0]) < optical[:, 2] * math.tan(HALF_WIDTH))
+        inside &= np.abs(optical[:, 1]) < optical[:, 2] * math.tan(HALF_HEIGHT)
+        for place, visible in zip(places, inside, strict=True):
+            seen[place] |= bool(visible)
+    return seen
+
+
+def test_one_round_of_search_sees_all_of_the_field_within_150_degrees_to_both_sides() -> None:
+    commands = drive(HeadMovement(HeadParameters(), ROBOT), HeadCommand(0, HeadMode.SEARCH), 9.0)
+    seen = covered(commands)
+    missed = [place for place, visible in seen.items() if not visible and abs(place[0]) <= math.radians(150.0)]
+    assert missed == []
+    assert sum(seen.values()) / len(seen) > 0.95
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_search_begins_on_the_side_where_the_target_was_lost(side: float) -> None:
+    head = HeadMovement(HeadParameters(), ROBOT)
+    target = (2.0, side * 1.0, 0.0)
+    angles = drive(head, HeadCommand(0, HeadMode.LOOK_AT, target), 1.0)[-1].position
+    pans = []
+    for tick in range(40):
+        command = head.update(2 * 10**9 + tick * PERIOD, HeadCommand(0, HeadMode.SEARCH), angles)
+        angles = command.position
+        pans.append(angles[0])
+    assert side * pans[-1] > side * pans[0] + 0.5
+
+
+def test_search_for_a_target_lost_at_the_feet_looks_near_first() -> None:
+    near = drive(HeadMovement(HeadParameters(), ROBOT), HeadCommand(0, HeadMode.SEARCH, (0.5, 0.1, 0.0)), 1.0)[-1]
+    far = drive(HeadMovement(HeadParameters(), ROBOT), HeadCommand(0, HeadMode.SEARCH, (3.0, 0.1, 0.0)), 1.0)[-1]
+    assert near.position[1] == pytest.approx(HeadParameters().search_tilt_near)
+    assert far.position[1] == pytest.approx(HeadParameters().search_tilt_far)
+
+
+def test_hold_stops_a_moving_head_within_its_braking_distance() -> None:
+    head = HeadMovement(HeadParameters(), ROBOT)
+    moving = drive(head, HeadCommand(0, HeadMode.LOOK_AT, (-1.0, 2.0, 0.0)), 0.24)[-1]
+    angles = moving.position
+    for tick in range(12, 40):
+        command = head.update(10**9 + tick * PERIOD, HeadCommand(0, HeadMode.HOLD), angles)
+        angles = command.position
+    speed = abs(moving.velocity[0])
+    braking = speed**2 / (2.0 * HeadParameters().acceleration) + 2.0 * speed * PERIOD * 1e-9
+    assert abs(command.velocity[0]) < 0.01
+    assert abs(angles[0] - moving.position[0]) < braking
+
+
+def test_after_a_pause_the_trajectory_begins_where_the_joints_are() -> None:
+    head = HeadMovement(HeadParameters(), ROBOT)
+    drive(head, HeadCommand(0, HeadMode.LOOK_AT, (1.0, 1.0, 0.0)), 1.0)
+    command = head.update(60 * 10**9, HeadCommand(0, HeadMode.LOOK_AT, (1.0, 1.0, 0.0)), np.array([-0.5, 0.2]))
+    assert command.position.tolist() == [-0.5, 0.2]
+
+
+def test_robot_without_head_is_refused() -> None:
+    with pytest.raises(ValueError, match="has no head"):
+        HeadMovement(HeadParameters(), load_robot("table"))
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"speed": 0.0}, {"damping": -1.0}, {"search_tilt_near": 0.1}, {"stiffness": math.nan}]
+)
+def test_parameters_out_of_range_are_refused_by_name(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        HeadParameters(**wrong)

@@ -1,0 +1,138 @@
+"""Motion control on the simulated body: stand, walk, stop, kick, fall. Physics only, no helper forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tulip_description.planar import Pose2D
+from tulip_description.robot import LEG_JOINTS
+from tulip_motion.interface import KickGoal, MotionMode, Side, WalkCommand, WalkMode
+from tulip_motion.motion import Motion
+from tulip_motion.parameters import MotionParameters
+from tulip_sim.scenario import Scenario
+from tulip_sim.world import World
+
+pytestmark = pytest.mark.sim
+STAND = WalkCommand(0, WalkMode.STAND)
+TICK = 0.004
+
+
+class Run:
+    """A robot on the field with motion control alone, one tick of delay between sensors and torques."""
+
+    def __init__(self, ball: tuple[float, float] = (3.0, -2.0), seed: int = 0) -> None:
+        self.world = World(Scenario(robot=Pose2D(-2.0, 0.0, 0.0), ball=ball, poles=False), seed=seed)
+        self.motion = Motion(MotionParameters(), self.world.robot)
+        self._pending = None
+        self.fastest_ball = 0.0
+
+    def go(self, seconds: float, command: Callable[[float], WalkCommand] = lambda _: STAND) -> None:
+        for k in range(round(seconds / TICK)):
+            self.motion.command(command(k * TICK))
+            answer = self.motion.tick(self.world.sensors())
+            if self._pending is not None:
+                assert self.world.apply(self._pending) == ""
+            self._pending = answer
+            self.world.advance(4)
+            self.fastest_ball = max(self.fastest_ball, float(np.hypot(*self.world.truth().ball_linear_velocity[:2])))
+
+
+def walk(forward: float, left: float = 0.0, turn: float = 0.0) -> Callable[[float], WalkCommand]:
+    return lambda _: WalkCommand(0, WalkMode.WALK, (forward, left, turn))
+
+
+def test_stands_still_with_the_zmp_between_the_feet() -> None:
+    run = Run()
+    run.go(2.0)
+    state = run.motion.state()
+    assert state.mode is MotionMode.STAND
+    np.testing.assert_allclose(state.zmp, state.dcm_desired, atol=0.02)
+    np.testing.assert_allclose(run.world.truth().base_position[:2] - [-2.0, 0.0], [0.0, 0.0], atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "moved"), [((0.4, 0.0, 0.0), (3.1, 0.0)), ((-0.2, 0.0, 0.0), (-1.4, 0.0)), ((0.0, 0.15, 0.0), (0.0, 1.0))]
+)
+def test_walks_as_commanded_then_stops(velocity: tuple[float, float, float], moved: tuple[float, float]) -> None:
+    run = Run()
+    run.go(0.3)
+    start = run.world.truth().base_position[:2]
+    run.go(8.0, walk(*velocity))
+    run.go(4.0)
+    assert run.motion.mode is MotionMode.STAND
+    way = run.world.truth().base_position[:2] - start
+    assert np.linalg.norm(way - moved) < 0.5  # start, stop and 5 % of slip over the way
+    dead_reckoned = run.motion.odometry().position[:2]
+    assert np.linalg.norm(dead_reckoned - way) < 0.15
+
+
+def test_turns_as_commanded() -> None:
+    run = Run()
+    run.go(5.0, walk(0.0, 0.0, 0.5))
+    yaw = run.motion.odometry().orientation
+    assert run.motion.mode is MotionMode.WALK
+    assert 2.0 * np.arctan2(yaw[2], yaw[3]) == pytest.approx(2.2, abs=0.4)
+
+
+@pytest.mark.parametrize("side", Side)
+def test_kicks_the_ball_at_two_metres_a_second_and_stays_upright(side: Side) -> None:
+    y = 0.12 if side is Side.LEFT else -0.12
+    run = Run(ball=(-2.0 + 0.067 + 0.15 + 0.095 + 0.03, y))
+    run.go(0.5)
+    assert run.motion.start_kick(KickGoal(side)) == ""
+    run.go(4.0)
+    assert run.motion.mode is MotionMode.STAND
+    assert run.fastest_ball > 2.0
+
+
+def test_a_kick_is_refused_with_a_reason_unless_the_robot_stands() -> None:
+    run = Run()
+    run.go(1.0, walk(0.1))
+    assert "mode WALK" in run.motion.start_kick(KickGoal(Side.LEFT))
+    standing = Run()
+    standing.go(0.1)
+    assert "speed" in standing.motion.start_kick(KickGoal(Side.LEFT, speed=9.0))
+    assert "direction" in standing.motion.start_kick(KickGoal(Side.LEFT, direction=2.0))
+
+
+def test_a_fall_ends_limp_and_says_why() -> None:
+    run = Run()
+    run.go(0.5)
+    run.world.push([0.0, 400.0, 0.0], 200)
+    run.go(2.5)
+    state = run.motion.state()
+    assert state.mode is MotionMode.FALLEN
+    assert "leans" in state.reason
+    answer = run.motion.tick(run.world.sensors())
+    assert answer.names == LEG_JOINTS
+    assert not answer.stiffness.any() and not answer.effort.any() and answer.damping.all()
+
+
+def test_limp_on_request_has_no_stiffness_and_stands_up_again_when_still_upright() -> None:
+    run = Run()
+    run.go(0.5)
+    run.go(0.05, lambda _: WalkCommand(0, WalkMode.LIMP))
+    assert run.motion.mode is MotionMode.LIMP
+    run.go(1.5)
+    assert run.motion.mode is MotionMode.STAND
+
+
+def test_a_velocity_that_is_not_finite_is_refused() -> None:
+    run = Run()
+    with pytest.raises(ValueError, match="finite"):
+        run.motion.command(replace(STAND, velocity=(float("nan"), 0.0, 0.0)))
+
+
+def test_torques_stay_inside_the_robots_limits_while_walking_fast() -> None:
+    run = Run()
+    limits = run.world.robot.effort_limits
+    peak = np.zeros(14)
+    for _ in range(60):
+        run.go(0.1, walk(0.6))
+        peak = np.maximum(peak, np.abs(run.world.sensors().joint_efforts))
+    assert run.motion.mode is MotionMode.WALK
+    assert np.all(peak <= limits)

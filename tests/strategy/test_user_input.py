@@ -1,0 +1,113 @@
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator
+
+import pytest
+from rich.console import Console
+
+from tulip_strategy.interface import UserCommand, UserRequest
+from tulip_strategy.menu import ENTRIES, Menu, Wish
+from tulip_strategy.user_input import UserInput, UserInputParameters
+
+STRATEGIES = ("dribble_and_kick", "goalkeeper")
+
+
+def user_input() -> UserInput:
+    return UserInput(UserInputParameters(), STRATEGIES)
+
+
+def test_a_robot_stands_until_the_user_starts_it_unless_it_starts_by_itself() -> None:
+    assert user_input().command.request is UserRequest.STOP
+    assert UserInput(UserInputParameters(autostart=True), STRATEGIES).command.request is UserRequest.PLAY
+
+
+def test_each_wish_replaces_the_last_and_counts_on() -> None:
+    user = user_input()
+    assert user.ask(5, UserRequest.WALK_TEST, velocity=(0.2, 0.0, -0.3)) == ""
+    assert user.command == UserCommand(5, UserRequest.WALK_TEST, velocity=(0.2, 0.0, -0.3), sequence=1)
+    assert user.ask(6, UserRequest.KICK_TEST) == ""
+    assert user.command == UserCommand(6, UserRequest.KICK_TEST, argument="right", sequence=2)
+    assert user.ask(7, UserRequest.KICK_TEST, argument="left") == ""
+    assert user.command == UserCommand(7, UserRequest.KICK_TEST, argument="left", sequence=3)
+
+
+def test_a_chosen_strategy_stays_chosen() -> None:
+    user = user_input()
+    user.ask(1, UserRequest.PLAY, strategy="goalkeeper")
+    user.ask(2, UserRequest.STOP)
+    user.ask(3, UserRequest.PLAY)
+    assert user.command.strategy == "goalkeeper"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"request": 6}, "request is 6; expected 0 to 5"),
+        ({"request": -1}, "request is -1"),
+        ({"request": 0, "strategy": "zone defence"}, "expected one of: dribble_and_kick, goalkeeper"),
+        ({"request": 3, "velocity": (0.7, 0.0, 0.0)}, "forward velocity is 0.7 m/s; expected -0.6 to 0.6"),
+        ({"request": 3, "velocity": (0.0, math.nan, 0.0)}, "left velocity is nan"),
+        ({"request": 3, "velocity": (0.0, 0.0, -math.inf)}, "turning velocity is -inf rad/s"),
+        ({"request": 4, "argument": "both"}, "argument is 'both'; expected left or right"),
+    ],
+)
+def test_a_wish_that_cannot_be_is_refused_in_words_and_changes_nothing(
+    arguments: dict[str, object], words: str
+) -> None:
+    user = user_input()
+    before = user.command
+    assert words in user.ask(1, **arguments)  # type: ignore[arg-type]
+    assert user.command is before
+
+
+def test_an_unknown_first_strategy_is_named() -> None:
+    with pytest.raises(ValueError, match="strategy is 'x'; expected one of: dribble_and_kick"):
+        UserInput(UserInputParameters(strategy="x"), STRATEGIES)
+
+
+def use_menu(monkeypatch: pytest.MonkeyPatch, *answers: str) -> tuple[list[Wish], str]:
+    """Type the answers, then end the input; return the wishes sent and what was shown."""
+    typed: Iterator[str] = iter(answers)
+
+    def read(_: str = "") -> str:
+        try:
+            return next(typed)
+        except StopIteration:
+            raise EOFError from None
+
+    monkeypatch.setattr("builtins.input", read)
+    sent: list[Wish] = []
+    user = user_input()
+
+    def send(wish: Wish) -> tuple[bool, str]:
+        sent.append(wish)
+        refusal = user.ask(0, wish.request, wish.strategy, wish.velocity, wish.argument)
+        return not refusal, refusal
+
+    screen = io.StringIO()
+    Menu(Console(file=screen, width=100), send, STRATEGIES).run()
+    return sent, screen.getvalue()
+
+
+def test_the_menu_sends_every_wish(monkeypatch: pytest.MonkeyPatch) -> None:
+    sent, shown = use_menu(
+        monkeypatch, "s", "x", "u", "w", "0.2", "0", "-0.3", "k", "left", "l", "c", "goalkeeper", "q", "s"
+    )
+    assert sent == [
+        Wish(UserRequest.PLAY),
+        Wish(UserRequest.STOP),
+        Wish(UserRequest.STAND),
+        Wish(UserRequest.WALK_TEST, velocity=(0.2, 0.0, -0.3)),
+        Wish(UserRequest.KICK_TEST, argument="left"),
+        Wish(UserRequest.LIMP),
+        Wish(UserRequest.PLAY, strategy="goalkeeper"),
+    ]
+    assert all(words in shown for _, words, _ in ENTRIES)
+
+
+def test_the_menu_asks_again_after_a_wrong_key_and_shows_a_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
+    sent, shown = use_menu(monkeypatch, "z", "w", "5", "0", "0")
+    assert [wish.request for wish in sent] == [UserRequest.WALK_TEST]
+    assert "refused: forward velocity is 5.0 m/s" in shown

@@ -1,0 +1,119 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tulip_description.field import LineSegment, load_field
+from tulip_vision.features import FeatureClass
+from tulip_worldmodel.direction import directions, meet_plane, rays
+from tulip_worldmodel.landmarks import half_turn, landmarks_of, line_misfit, point_directions
+
+CAMERA = np.array([0.05, 0.02, 1.15])
+STEP = 1e-6
+
+states = st.tuples(
+    st.floats(-4.0, 4.0),
+    st.floats(-3.0, 3.0),
+    st.floats(-3.0, 3.0),
+    st.floats(-0.05, 0.05),
+    st.floats(-0.05, 0.05),
+    st.floats(-0.05, 0.05),
+).map(np.array)
+
+
+def numeric(function, at: np.ndarray) -> np.ndarray:
+    """Return the central-difference Jacobian of a function that returns (m,)."""
+    columns = []
+    for index in range(len(at)):
+        step = np.zeros_like(at)
+        step[index] = STEP
+        columns.append((function(at + step) - function(at - step)) / (2.0 * STEP))
+    return np.stack(columns, axis=-1)
+
+
+@settings(max_examples=60, deadline=None)
+@given(state=states, place=st.tuples(st.floats(-5.0, 5.0), st.floats(-4.0, 4.0)))
+def test_jacobian_of_point_directions_agrees_with_finite_differences(state, place) -> None:
+    points = np.array([place])
+    if math.dist(place, state[:2]) < 0.5:
+        return  # nearly below the camera the azimuth has no meaning
+    angles, jacobian = point_directions(state, points, CAMERA)
+    if abs(angles[0, 0]) > 3.13:
+        return  # the azimuth's wrap is not differentiable
+    expected = numeric(lambda x: point_directions(x, points, CAMERA)[0][0], state)
+    assert np.allclose(jacobian[0], expected, rtol=1e-5, atol=1e-6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    state=states,
+    ends=st.tuples(st.floats(-2.0, 2.0), st.floats(-1.2, -0.2), st.floats(0.1, 1.0), st.floats(-1.2, -0.2)),
+)
+def test_jacobians_of_line_misfit_agree_with_finite_differences(state, ends) -> None:
+    azimuth, elevation, width, end_elevation = ends
+    seen = np.array([[azimuth, elevation], [azimuth + width, end_elevation]])
+    line = LineSegment((1.0, -2.0), (-2.0, 1.0))
+    misfit, by_state, by_angles, _ = line_misfit(state, seen, line, CAMERA)
+    if abs(misfit[0]) > 1.56:
+        return  # the direction's wrap is not differentiable
+    expected = numeric(lambda x: line_misfit(x, seen, line, CAMERA)[0], state)
+    assert np.allclose(by_state, expected, rtol=1e-4, atol=1e-5)
+    expected = numeric(lambda z: line_misfit(state, z.reshape(2, 2), line, CAMERA)[0], seen.ravel())
+    assert np.allclose(by_angles, expected, rtol=1e-4, atol=1e-4)
+
+
+@given(azimuth=st.floats(-3.1, 3.1), elevation=st.floats(-1.4, -0.1), height=st.floats(0.0, 0.2))
+def test_ray_that_meets_a_plane_comes_from_the_direction_of_the_meeting_point(azimuth, elevation, height) -> None:
+    unit, _ = rays(np.array([[azimuth, elevation]]))
+    points, _ = meet_plane(unit, CAMERA, height)
+    angles, _ = directions(np.array([[*(points[0] - CAMERA[:2]), height - CAMERA[2]]]))
+    assert angles[0] == pytest.approx([azimuth, elevation], abs=1e-9)
+
+
+def test_jacobian_of_rays_on_a_plane_agrees_with_finite_differences() -> None:
+    angles = np.array([0.4, -0.6])
+    unit, by_angles = rays(angles[None])
+    _, by_ray = meet_plane(unit, CAMERA, 0.09)
+    expected = numeric(lambda a: meet_plane(rays(a[None])[0], CAMERA, 0.09)[0][0], angles)
+    assert np.allclose(by_ray[0] @ by_angles[0], expected, rtol=1e-6)
+
+
+def test_piece_on_the_line_has_no_misfit_in_either_order_of_its_ends() -> None:
+    line = LineSegment((2.0, -2.0), (2.0, 2.0))
+    state = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0])
+    seen, _ = point_directions(state, np.array([[2.0, -1.0], [2.0, 1.5]]), CAMERA)
+    for ends in (seen, seen[::-1]):
+        misfit, _, _, along = line_misfit(state, ends, line, CAMERA)
+        assert misfit == pytest.approx([0.0, 0.0], abs=1e-9)
+        assert sorted(along) == pytest.approx([1.0, 3.5])
+
+
+@given(st.floats(-20.0, 20.0))
+def test_half_turn_keeps_an_undirected_line(angle: float) -> None:
+    wrapped = half_turn(angle)
+    assert -math.pi / 2.0 <= wrapped <= math.pi / 2.0
+    assert math.sin(wrapped - angle) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_field_gives_its_landmarks_by_class() -> None:
+    points = landmarks_of(load_field()).points
+    counts = {kind: len(places) for kind, places in points.items()}
+    assert counts == {
+        FeatureClass.GOAL_POST: 4,
+        FeatureClass.PENALTY_MARK: 2,
+        FeatureClass.CROSSING_L: 8,
+        FeatureClass.CROSSING_T: 6,
+        FeatureClass.CROSSING_X: 2,
+        FeatureClass.POLE_YELLOW_BLUE_YELLOW: 1,
+        FeatureClass.POLE_BLUE_YELLOW_BLUE: 1,
+    }
+    assert points[FeatureClass.POLE_YELLOW_BLUE_YELLOW][0, 1] > 0.0
+
+
+def test_field_without_poles_has_no_pole_landmarks() -> None:
+    points = landmarks_of(load_field().without_poles()).points
+    assert points[FeatureClass.POLE_YELLOW_BLUE_YELLOW].shape == (0, 2)

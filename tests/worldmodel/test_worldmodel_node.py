@@ -1,0 +1,161 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from nav_msgs.msg import Odometry as OdometryMessage
+from walk_simulation import CAMERA, Simulation
+
+from tulip_description.planar import Pose2D
+from tulip_motion.messages import odometry_to_message
+from tulip_msgs.msg import Feature as FeatureMessage
+from tulip_msgs.msg import Features as FeaturesMessage
+from tulip_ros import topics
+from tulip_ros.run import session
+from tulip_ros.time import header, stamp_of
+from tulip_strategy.messages import world_state_from_message
+from tulip_vision.features import Features
+from tulip_worldmodel.messages import (
+    features_from_message,
+    map_to_odom_message,
+    robot_pose_to_message,
+    world_state_to_message,
+)
+from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
+from tulip_worldmodel.world_state import WorldState
+from tulip_worldmodel.worldmodel_node import WorldModelNode
+
+pytestmark = pytest.mark.ros
+
+
+def features_message(features: Features) -> FeaturesMessage:
+    return FeaturesMessage(
+        header=header(features.stamp, "base_footprint"),
+        camera_position=features.camera_position,
+        view=features.view,
+        features=[FeatureMessage(**{**vars(feature), "kind": int(feature.kind)}) for feature in features.features],
+    )
+
+
+def simulated(seconds: float = 2.0) -> tuple[list[OdometryMessage | FeaturesMessage], WorldState]:
+    """Return messages of a walk towards ball and keeper, and the world at its end."""
+    ball = (np.array([0.5, 0.1]), np.zeros(2))
+    simulation = Simulation(
+        lambda time, pose: (0.2, 0.0, 0.1),
+        seconds,
+        Pose2D(-1.5, 0.0, 0.0),
+        np.random.default_rng(1),
+        ball=lambda time: ball,
+        opponent=lambda time: np.array([2.0, 0.5]),
+        head_pan=lambda time: 0.0,
+    )
+    world = WorldModel(WorldModelParameters(), simulation.arena, simulation.start)
+    messages: list[OdometryMessage | FeaturesMessage] = []
+    for moment in simulation.run():
+        world.add_odometry(moment.odometry)
+        messages.append(odometry_to_message(moment.odometry))
+        if moment.features is not None:
+            world.add_features(moment.features)
+            messages.append(features_message(moment.features))
+    return messages, world.state(moment.stamp)
+
+
+def same(first: object, second: object) -> bool:
+    """Tell whether two dataclass objects agree to rounding; arrays and nested objects included."""
+    if hasattr(first, "__dataclass_fields__"):
+        return all(same(getattr(first, name), getattr(second, name)) for name in first.__dataclass_fields__)
+    if isinstance(first, tuple):
+        return len(first) == len(second) and all(same(a, b) for a, b in zip(first, second, strict=True))
+    if first is None or second is None:
+        return first is second
+    return np.allclose(np.asarray(first, dtype=float), np.asarray(second, dtype=float), equal_nan=True)
+
+
+def test_features_survive_the_way_through_a_message() -> None:
+    simulation = Simulation(lambda time, pose: (0.0, 0.0, 0.0), 0.5, Pose2D(), np.random.default_rng(0))
+    pictures = [moment.features for moment in simulation.run() if moment.features is not None]
+    assert sum(len(picture.features) for picture in pictures) > 5
+    assert all(same(features_from_message(features_message(picture)), picture) for picture in pictures)
+
+
+def test_world_state_survives_the_way_through_a_message_with_and_without_ball() -> None:
+    _, world = simulated()
+    assert world.ball is not None and len(world.opponents) == 1
+    for state in (world, replace(world, ball=None, opponents=())):
+        assert same(world_state_from_message(world_state_to_message(state)), state)
+
+
+def test_transform_of_odom_and_standard_pose_agree_with_the_estimate() -> None:
+    _, world = simulated()
+    transform = map_to_odom_message(world).transforms[0]
+    turn = transform.transform.rotation
+    odom = Pose2D(
+        transform.transform.translation.x, transform.transform.translation.y, 2.0 * math.atan2(turn.z, turn.w)
+    )
+    assert same(odom @ world.robot.pose_in_odom, world.robot.pose)
+    assert (transform.header.frame_id, transform.child_frame_id) == ("map", "odom")
+    pose = robot_pose_to_message(world).pose
+    assert pose.pose.position.x == world.robot.pose.x
+    assert np.array(pose.covariance).reshape(6, 6)[0, 5] == world.robot.covariance[0, 2]
+
+
+def collect(node: WorldModelNode, spin: Callable[[float], None], messages: list) -> dict[str, list]:
+    """Send messages through the graph one by one and return what the node published."""
+    received: dict[str, list] = {"world_state": [], "robot_pose": [], "tf": []}
+    watched = {"world_state": topics.WORLD_STATE, "robot_pose": topics.ROBOT_POSE, "tf": topics.TF}
+    for name, topic in watched.items():
+        topic.subscribe_from(node, received[name].append)
+    odometry, features = topics.ODOMETRY.publish_from(node), topics.FEATURES.publish_from(node)
+    for message in messages:
+        sender = odometry if isinstance(message, OdometryMessage) else features
+        expected = len(received["world_state"]) + 1
+        sender.publish(message)
+        for _ in range(200):
+            spin(0.05 if sender is odometry else 0.005)
+            if sender is features or len(received["world_state"]) >= expected:
+                break
+    for _ in range(20):
+        spin(0.01)
+    return received
+
+
+def test_node_publishes_the_state_of_the_core_on_its_three_topics(ros_domain: int) -> None:
+    messages, world = simulated(1.0)
+    with session(WorldModelNode, arguments=["test"]) as (node, spin):
+        received = collect(node, spin, messages)
+    odometry_count = sum(isinstance(message, OdometryMessage) for message in messages)
+    assert len(received["world_state"]) == len(received["robot_pose"]) == len(received["tf"]) == odometry_count
+    last = received["world_state"][-1]
+    assert stamp_of(last) == world.stamp
+    assert last.robot_pose == pytest.approx(world.robot.pose.as_array(), abs=0.05)
+    assert last.ball_known
+    assert last.ball.position == pytest.approx(world.ball.position, abs=0.1)
+
+
+def test_node_begins_anew_when_time_goes_back(ros_domain: int) -> None:
+    messages, _ = simulated(1.0)
+    still = Simulation(lambda time, pose: (0.0, 0.0, 0.0), 0.1, Pose2D(), np.random.default_rng(0))
+    anew = [replace(moment.odometry, stamp=moment.stamp - 10**9) for moment in still.run()]
+    later = []
+    for message in messages:
+        message.header.stamp.sec += 50
+        later.append(message)
+    with session(WorldModelNode, arguments=["test"]) as (node, spin):
+        received = collect(node, spin, [*later, *(odometry_to_message(odometry) for odometry in anew)])
+    last = received["world_state"][-1]
+    assert stamp_of(last) == anew[-1].stamp
+    assert last.robot_pose == pytest.approx([-1.5, 0.0, 0.0], abs=0.01)
+    assert not last.ball_known
+
+
+def test_camera_of_the_simulation_is_as_high_as_that_of_the_standing_robot() -> None:
+    from tulip_description.camera_pose import camera_in_footprint
+    from tulip_description.posture import standing_posture
+    from tulip_description.robot import load_robot
+
+    robot = load_robot()
+    transform = camera_in_footprint(robot, standing_posture(robot).base_height, (0.0, 0.0, 0.0, 1.0), 0.0, 0.4)
+    assert transform[2, 3] == pytest.approx(CAMERA[2], abs=0.05)

@@ -1,0 +1,1 @@
+"""Robot and field as data, and the models made from them."""

@@ -1,0 +1,1 @@
+"""Walking, kicking, balance, odometry and head movement."""

@@ -1,0 +1,135 @@
+"""Motion control as a node: sensors, walk commands and kicks in; leg commands, odometry and state out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.action.server import ServerGoalHandle
+from rclpy.task import Future
+
+from tulip_description.robot import load_robot
+from tulip_motion.interface import KickGoal, MotionMode, Side, WalkCommand, WalkMode
+from tulip_motion.messages import (
+    body_transforms,
+    joint_command_to_message,
+    motion_state_to_message,
+    odometry_to_message,
+    sensors_from_messages,
+    walk_command_from_message,
+)
+from tulip_motion.motion import Motion
+from tulip_motion.parameters import MotionParameters
+from tulip_msgs.action import Kick
+from tulip_msgs.msg import WalkCommand as WalkCommandMessage
+from tulip_ros import topics
+from tulip_ros.matching import SameStamp
+from tulip_ros.run import ComponentNode, run
+from tulip_ros.time import stamp_of
+
+SLOW_TICKS = 5  # odometry and state go out at every fifth tick: 50 Hz is enough for all that listen
+COMMAND_LIFE = 500_000_000  # [ns] a walking robot whose strategy is silent for longer stops
+
+
+@dataclass
+class _RunningKick:
+    goal: ServerGoalHandle
+    done: Future
+
+
+class MotionNode(ComponentNode):
+    """Turns messages into calls of motion control and its answers into messages."""
+
+    def __init__(self) -> None:
+        """Make the core and connect it."""
+        super().__init__("motion")
+        self._motion = Motion(self.load(MotionParameters()), load_robot())
+        self._tick = 0
+        self._walking_until = 0
+        self._kick: _RunningKick | None = None
+        self._legs = self.sender(topics.LEG_COMMAND)
+        self._odometry = self.sender(topics.ODOMETRY)
+        self._state = self.sender(topics.MOTION_STATE)
+        self._tf = self.sender(topics.TF)
+        self._sensors = SameStamp("joint_states", "imu", "foot_forces")
+        self.listen(topics.JOINT_STATES, lambda message: self._on_sensor("joint_states", message))
+        self.listen(topics.IMU, lambda message: self._on_sensor("imu", message))
+        self.listen(topics.FOOT_FORCES, lambda message: self._on_sensor("foot_forces", message))
+        self.listen(topics.WALK_COMMAND, self._on_walk_command)
+        self._kicks = ActionServer(
+            self,
+            topics.KICK.type,
+            topics.KICK.name,
+            self._execute_kick,
+            cancel_callback=lambda _: CancelResponse.REJECT,
+        )
+
+    def _on_sensor(self, name: str, message: Any) -> None:
+        complete = self._sensors.add(name, stamp_of(message), message)
+        if complete is None:
+            return
+        try:
+            sensors = sensors_from_messages(*complete)
+        except ValueError as error:
+            self.health.count("refused sensors", str(error))
+            return
+        if self._walking_until and sensors.stamp > self._walking_until:
+            self.health.count("walk command too old", "strategy is silent: the robot stops walking")
+            self._motion.command(WalkCommand(sensors.stamp, WalkMode.STAND))
+            self._walking_until = 0
+        self._legs.publish(joint_command_to_message(self._motion.tick(sensors)))
+        self._tick += 1
+        if self._tick % SLOW_TICKS == 0:
+            self._report()
+
+    def _report(self) -> None:
+        odometry, state = self._motion.odometry(), self._motion.state()
+        self._odometry.publish(odometry_to_message(odometry))
+        self._tf.publish(body_transforms(odometry))
+        self._state.publish(motion_state_to_message(state, odometry.distance))
+        if self._kick is None:
+            return
+        if state.mode is MotionMode.KICK:
+            self._kick.goal.publish_feedback(Kick.Feedback(phase=state.phase))
+        else:
+            succeeded = state.mode in (MotionMode.STAND, MotionMode.WALK)
+            self._kick.done.set_result((succeeded, "" if succeeded else state.reason))
+            self._kick = None
+
+    def _on_walk_command(self, message: WalkCommandMessage) -> None:
+        try:
+            command = walk_command_from_message(message)
+            self._motion.command(command)
+        except ValueError as error:
+            self.health.count("refused walk command", f"walk command refused: {error}")
+            return
+        self._walking_until = command.stamp + COMMAND_LIFE if command.mode is WalkMode.WALK else 0
+
+    async def _execute_kick(self, goal: ServerGoalHandle) -> Kick.Result:
+        """Kick, or refuse: a goal is always accepted first, since only a result can carry the reason."""
+        wish = goal.request
+        if wish.side in (Kick.Goal.LEFT, Kick.Goal.RIGHT):
+            refusal = self._motion.start_kick(KickGoal(Side(wish.side), wish.direction, wish.speed))
+        else:
+            refusal = f"side is {wish.side}; expected 0 (left) or 1 (right)"
+        if refusal:
+            self.health.count("refused kick", f"kick refused: {refusal}")
+            success, reason = False, refusal
+        else:
+            self._kick = _RunningKick(goal, Future())
+            success, reason = await self._kick.done
+        if success:
+            goal.succeed()
+        else:
+            goal.abort()
+        return Kick.Result(success=success, reason=reason)
+
+
+def main() -> None:
+    """Run the node."""
+    run(MotionNode)
+
+
+if __name__ == "__main__":
+    main()

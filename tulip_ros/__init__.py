@@ -1,0 +1,1 @@
+"""What the ROS side of every component shares: topics, parameters, running, launching and recording."""

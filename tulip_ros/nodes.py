@@ -1,0 +1,83 @@
+"""The nodes of the graph: name, module, and the file of parameter values that they start with."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import dataclass
+from pathlib import Path
+
+from tulip_ros.errors import unknown
+
+
+@dataclass(frozen=True)
+class NodeEntry:
+    """One node.
+
+    Attributes:
+        name: Name in the graph.
+        module: Module that runs it, as in `python -m MODULE`.
+        playing: Part of the robot that plays; such a node never sees the ground truth.
+    """
+
+    name: str
+    module: str
+    playing: bool = True
+
+    @property
+    def package(self) -> str:
+        """The Python package that holds the node."""
+        return self.module.split(".")[0]
+
+    @property
+    def default_parameters(self) -> Path | None:
+        """The file NAME.parameters.yaml in the node's package, or None: the values in the code hold."""
+        spec = importlib.util.find_spec(self.package)
+        for folder in (spec.submodule_search_locations or []) if spec else []:
+            path = Path(folder) / f"{self.name}.parameters.yaml"
+            if path.exists():
+                return path
+        return None
+
+
+NODES: dict[str, NodeEntry] = {
+    entry.name: entry
+    for entry in (
+        NodeEntry("vision", "tulip_vision.vision_node"),
+        NodeEntry("worldmodel", "tulip_worldmodel.worldmodel_node"),
+        NodeEntry("head", "tulip_motion.head_node"),
+        NodeEntry("motion", "tulip_motion.motion_node"),
+        NodeEntry("strategy", "tulip_strategy.strategy_node"),
+        NodeEntry("game_input", "tulip_strategy.game_input_node"),
+        NodeEntry("user_input", "tulip_strategy.user_input_node"),
+        NodeEntry("recorder", "tulip_ros.recorder_node", playing=False),
+    )
+}
+"""All nodes but the driver, by name."""
+
+DRIVERS: dict[str, NodeEntry] = {"sim": NodeEntry("driver", "tulip_sim.driver_node", playing=False)}
+"""What can stand for the robot's body: each is a node named "driver"."""
+
+ROBOT: tuple[str, ...] = tuple(name for name, entry in NODES.items() if entry.playing)
+"""The nodes that make the robot play, in the order of the data flow."""
+
+
+def find_node(name: str) -> NodeEntry:
+    """Return a node's entry.
+
+    Raises:
+        BadInputError: if there is no node of that name.
+    """
+    if name not in NODES:
+        raise unknown("node", name, NODES)
+    return NODES[name]
+
+
+def find_driver(name: str) -> NodeEntry:
+    """Return a driver's entry.
+
+    Raises:
+        BadInputError: if there is no driver of that name.
+    """
+    if name not in DRIVERS:
+        raise unknown("driver", name, DRIVERS)
+    return DRIVERS[name]

@@ -1,0 +1,140 @@
+"""What to launch: from the names and files that a user gives to one command line a node."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from tulip_ros.errors import BadInputError, unknown
+from tulip_ros.nodes import DRIVERS, NODES, ROBOT, NodeEntry, find_driver, find_node
+
+Values = Mapping[str, Any]
+EVERY_NODE = "/**"
+NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*")
+SIMULATED = frozenset({"sim"})
+"""Drivers that publish /clock, which the other nodes follow then."""
+
+
+class _Loader(yaml.SafeLoader):
+    """Reads 1e-3 as a number, as ROS does; YAML 1.1 alone wants 1.0e-3."""
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$"), list("-+.0123456789")
+)
+
+
+@dataclass(frozen=True)
+class Start:
+    """One node to start.
+
+    Attributes:
+        name: Name in the graph.
+        entry: Which program it is.
+        parameters: Values that differ from those in the code, nested as in YAML.
+        namespace: As in "striker", or "".
+    """
+
+    name: str
+    entry: NodeEntry
+    parameters: Values
+    namespace: str
+
+    def command(self, parameter_file: Path) -> list[str]:
+        """Write the parameters to a file and return the command line that uses it."""
+        parameter_file.write_text(yaml.safe_dump({EVERY_NODE: {"ros__parameters": dict(self.parameters)}}))
+        command = [sys.executable, "-m", self.entry.module, "--ros-args", "--params-file", str(parameter_file)]
+        return [*command, "-r", f"__ns:=/{self.namespace}"] if self.namespace else command
+
+
+def make_plan(
+    nodes: Sequence[str] = (),
+    driver: str | None = "sim",
+    namespace: str = "",
+    parameter_files: Sequence[Path] = (),
+    values: Mapping[str, Values] | None = None,
+) -> tuple[Start, ...]:
+    """Return the nodes to start, in order.
+
+    Args:
+        nodes: Names of nodes; none means the whole robot.
+        driver: Name of the driver, or None for no driver.
+        namespace: For all nodes, as in "striker".
+        parameter_files: YAML files, later ones win.
+        values: Parameters by node name, which win over the files.
+
+    Raises:
+        BadInputError: for an unknown name, a bad namespace, or a file that cannot be used.
+    """
+    entries = [find_driver(driver)] if driver else []
+    entries += [find_node(name) for name in dict.fromkeys(nodes or ROBOT)]
+    entries.sort(key=lambda entry: entry.name != "recorder")  # starts first, so that it misses nothing
+    namespace = namespace.strip("/")
+    if namespace and not NAMESPACE.fullmatch(namespace):
+        raise BadInputError(f"Namespace is {namespace!r}; expected letters, digits and _, as in striker.")
+    given: list[Mapping[str, Values]] = [read_parameters(path) for path in parameter_files]
+    if values:
+        given.append(values)
+    starts = []
+    for entry in entries:
+        merged: dict[str, Any] = {"use_sim_time": driver in SIMULATED and entry.name != "driver"}
+        own = entry.default_parameters
+        for layer in ([read_parameters(own)] if own else []) + given:
+            merge(merged, layer.get(EVERY_NODE, {}))
+            merge(merged, layer.get(entry.name, {}))
+        starts.append(Start(entry.name, entry, merged, namespace))
+    return tuple(starts)
+
+
+def read_parameters(path: Path) -> dict[str, Values]:
+    """Read a parameter file: `node: {name: value}`, or ROS's form with ros__parameters in between.
+
+    Raises:
+        BadInputError: if it cannot be read, is no such YAML, or names a node that does not exist.
+    """
+    try:
+        content = yaml.load(path.read_text(), _Loader)
+    except OSError as error:
+        raise BadInputError(f"Parameter file {path} cannot be read: {error.strerror}.") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise BadInputError(f"Parameter file {path} is no valid YAML: {error}") from error
+    if content is None:
+        return {}
+    if not isinstance(content, dict):
+        raise BadInputError(f"Parameter file {path} holds {type(content).__name__}; expected `node: {{name: value}}`.")
+    result: dict[str, Values] = {}
+    for key, block in content.items():
+        name = str(key) if key == EVERY_NODE else str(key).split("/")[-1]
+        if name not in (EVERY_NODE, "driver", *NODES):
+            raise unknown(f"node in {path} called", str(key), [*NODES, "driver", EVERY_NODE])
+        if isinstance(block, dict) and set(block) == {"ros__parameters"}:
+            block = block["ros__parameters"]
+        if not isinstance(block, dict):
+            raise BadInputError(f"Parameter file {path}: {key} holds {block!r}; expected `name: value` lines.")
+        result[name] = block
+    return result
+
+
+def merge(values: dict[str, Any], newer: Values) -> None:
+    """Put newer values over older ones; nested blocks are merged, dotted names are blocks."""
+    for key, value in newer.items():
+        *blocks, name = str(key).split(".")
+        target = values
+        for block in blocks:
+            target = target.setdefault(block, {})
+        if isinstance(value, Mapping):
+            inner = target.setdefault(name, {})
+            merge(inner, value)
+        else:
+            target[name] = value
+
+
+def known_names() -> str:
+    """Return all names of nodes and drivers, for help texts."""
+    return f"nodes: {', '.join(NODES)}; drivers: {', '.join(DRIVERS)}"

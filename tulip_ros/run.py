@@ -1,0 +1,162 @@
+"""One way to run a node: parameters, topics, health, executor, clean end.
+
+A node's module is thin:
+
+    class VisionNode(ComponentNode):
+        def __init__(self) -> None:
+            super().__init__("vision")
+            self.core = Vision(self.load(VisionParameters()))
+            self.features = self.sender(topics.FEATURES)
+            self.listen(topics.CAMERA_IMAGE, self.on_image)
+
+    if __name__ == "__main__":
+        run(VisionNode)
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NoReturn, TypeVar
+
+import rclpy
+from rclpy.clock import Clock, ClockType
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
+from rclpy.timer import Timer
+
+from tulip_ros import parameters, transport
+from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, unknown
+from tulip_ros.health import Health
+from tulip_ros.time import stamp_of
+from tulip_ros.topics import Topic
+
+P = TypeVar("P")
+N = TypeVar("N", bound=Node)
+
+EXECUTOR_VARIABLE = "TULIP_EXECUTOR"
+"""Environment variable that chooses the executor."""
+EXECUTORS: dict[str, Callable[[], Executor]] = {
+    "events": EventsExecutor,  # 38 us a callback with its publish
+    "single": SingleThreadedExecutor,  # 215 us, the older and better known one
+}
+SPIN = 0.5  # [s] longest wait between two looks at whether to end
+
+
+class ComponentNode(Node):
+    """A node around a core."""
+
+    def __init__(self, name: str, **options: Any) -> None:
+        """Make the node.
+
+        Args:
+            name: Its name in the graph, as in `tulip_ros.nodes`.
+            options: For rclpy's Node, as in `namespace`, `parameter_overrides`.
+        """
+        super().__init__(name, **options)
+        self.health = Health(self)
+
+    def load(self, defaults: P) -> P:
+        """Declare a core's parameters and return them with the user's values.
+
+        Args:
+            defaults: The core's parameters dataclass, as in `VisionParameters()`.
+
+        Raises:
+            BadInputError: for an unknown name or an unfit value. `run` ends the node with exit code 2 then.
+        """
+        return parameters.declare(self, defaults)
+
+    def sender(self, topic: Topic) -> Publisher:
+        """Return the publisher of a topic. Its `publish` takes messages, or bytes of a serialized one."""
+        return topic.publish_from(self)
+
+    def listen(self, topic: Topic, callback: Callable[[Any], None]) -> Subscription:
+        """Call back with each message of a topic; the messages are counted for the diagnostics."""
+        has_header = "header" in topic.message.get_fields_and_field_types()
+        received, name = self.health.received, topic.name
+
+        def counted(message: Any) -> None:
+            received(name, stamp_of(message) if has_header else 0)
+            callback(message)
+
+        return topic.subscribe_from(self, counted)
+
+    def every(self, period: float, callback: Callable[[], None]) -> Timer:
+        """Call back every `period` [s] of wall-clock time: for sockets and keyboards, never for control."""
+        return self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+
+@contextmanager
+def session(
+    make_node: Callable[[], N],
+    arguments: Sequence[str] | None = None,
+    executor: str | None = None,
+    handle_signals: bool = True,
+) -> Iterator[tuple[N, Callable[[float], None]]]:
+    """Start ROS, make a node, and end both cleanly.
+
+    Args:
+        make_node: Makes the node; called after ROS was started.
+        arguments: Command line with `--ros-args`; the process's own by default.
+        executor: "events" or "single"; by default what TULIP_EXECUTOR says, else "events".
+        handle_signals: Let SIGINT and SIGTERM end ROS; otherwise the program sees to them itself.
+
+    Yields:
+        The node, and a function that waits up to so many seconds for work and does it.
+
+    Raises:
+        BadInputError: for an unknown executor, or arguments or parameters that cannot be used.
+    """
+    choice = executor or os.environ.get(EXECUTOR_VARIABLE, "events")
+    if choice not in EXECUTORS:
+        raise unknown("executor", choice, EXECUTORS)
+    transport.use_profile()
+    try:
+        rclpy.init(
+            args=list(sys.argv if arguments is None else arguments),
+            signal_handler_options=SignalHandlerOptions.ALL if handle_signals else SignalHandlerOptions.NO,
+        )
+        node = make_node()
+    except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
+        rclpy.try_shutdown()
+        raise BadInputError(f"ROS refuses the arguments: {error}") from error
+    except BaseException:
+        rclpy.try_shutdown()
+        raise
+    spinner = EXECUTORS[choice]()
+    spinner.add_node(node)
+    try:
+        yield node, lambda timeout: spinner.spin_once(timeout_sec=timeout)
+    finally:
+        spinner.shutdown()
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def run(make_node: Callable[[], Node], arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run a node until SIGINT or SIGTERM, then end the process.
+
+    Args:
+        make_node: Makes the node; called after ROS was started.
+        arguments: As for `session`.
+
+    Exit codes: 0 after a signal, 2 for bad input (message, no traceback); any other error ends with its traceback.
+    """
+    try:
+        with session(make_node, arguments) as (_, spin):
+            while rclpy.ok():
+                spin(SPIN)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except BadInputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise SystemExit(EXIT_BAD_INPUT) from None
+    raise SystemExit(0)

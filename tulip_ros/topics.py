@@ -1,0 +1,241 @@
+"""Every topic, service and action of the graph, once: name, type, quality of service, who publishes, who listens.
+
+Names are relative, so a namespace holds a whole robot. `/clock` alone is shared by all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, Imu, JointState
+from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
+
+from tulip_msgs.action import Kick
+from tulip_msgs.msg import (
+    Decision,
+    Features,
+    FootForces,
+    GameState,
+    GroundTruth,
+    HeadCommand,
+    JointCommand,
+    MotionState,
+    UserCommand,
+    WalkCommand,
+    WorldState,
+)
+from tulip_msgs.srv import PlaceBall, Push, Reset, SetUserCommand, StartRecording, StopRecording
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Quality of service.
+
+    Attributes:
+        depth: How many messages wait for a slow listener; older ones are dropped.
+        latched: The last message also reaches listeners that come later.
+    """
+
+    depth: int
+    latched: bool = False
+
+    def profile(self) -> QoSProfile:
+        """Return the profile for rclpy: always reliable, keep last."""
+        return QoSProfile(
+            history=HistoryPolicy.KEEP_LAST,
+            depth=self.depth,
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL if self.latched else DurabilityPolicy.VOLATILE,
+        )
+
+    def __str__(self) -> str:
+        return f"reliable, last {self.depth}" + (", latched" if self.latched else "")
+
+
+CONTROL = Quality(depth=5)  # a command or state that the next one replaces; 5 bridge 20 ms at 250 Hz
+PICTURE = Quality(depth=2)  # 0.9 MB each: a slow listener sees the newest pictures instead of old ones
+STATE = Quality(depth=10)
+LATCHED = Quality(depth=1, latched=True)
+EVENTS = Quality(depth=50)  # from many senders at once
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic.
+
+    Attributes:
+        name: Relative name ("/clock" alone is absolute).
+        message: Class of the message.
+        quality: Quality of service, of publishers and subscribers alike.
+        publishers: Names of the nodes that publish it.
+        subscribers: Names of the nodes that listen, without tools (recorder, viewers).
+        meaning: What it carries.
+    """
+
+    name: str
+    message: type[Any]
+    quality: Quality
+    publishers: tuple[str, ...]
+    subscribers: tuple[str, ...]
+    meaning: str
+
+    @property
+    def type_name(self) -> str:
+        """The type as ROS writes it: package/msg/Name."""
+        return type_name(self.message)
+
+    def publish_from(self, node: Node) -> Publisher:
+        """Create this topic's publisher in a node."""
+        return node.create_publisher(self.message, self.name, self.quality.profile())
+
+    def subscribe_from(self, node: Node, callback: Callable[[Any], None], raw: bool = False) -> Subscription:
+        """Create a subscription to this topic in a node.
+
+        Args:
+            node: The node.
+            callback: Is given each message.
+            raw: Give the callback the serialized message (bytes) instead.
+        """
+        return node.create_subscription(self.message, self.name, callback, self.quality.profile(), raw=raw)
+
+
+@dataclass(frozen=True)
+class Service:
+    """One service or action: relative name, type, the node that serves it and what it does."""
+
+    name: str
+    type: type[Any]
+    server: str
+    meaning: str
+
+    @property
+    def type_name(self) -> str:
+        """The type as ROS writes it: package/srv/Name or package/action/Name."""
+        return type_name(self.type)
+
+
+def type_name(interface: type[Any]) -> str:
+    """Return the name of a message, service or action class as ROS writes it, as in sensor_msgs/msg/Image."""
+    package, kind, *_ = interface.__module__.split(".")
+    return f"{package}/{kind}/{interface.__name__}"
+
+
+ALL_NODES = ("driver", "vision", "worldmodel", "head", "motion", "strategy", "game_input", "user_input")
+
+CAMERA_IMAGE = Topic(
+    "camera/image_raw", Image, PICTURE, ("driver",), ("vision",), "picture of the head camera, bgr8, distorted"
+)
+CAMERA_COMPRESSED = Topic(
+    "camera/image_raw/compressed",
+    CompressedImage,
+    PICTURE,
+    ("driver",),
+    (),
+    "the same as JPEG, for recordings and viewers; sent while someone listens",
+)
+CAMERA_INFO = Topic("camera/camera_info", CameraInfo, LATCHED, ("driver",), ("vision",), "lens of the head camera")
+JOINT_STATES = Topic(
+    "joint_states", JointState, CONTROL, ("driver",), ("motion", "head", "vision"), "14 joints: [rad], [rad/s], [N m]"
+)
+IMU = Topic("imu", Imu, CONTROL, ("driver",), ("motion",), "inertial unit in the trunk, in imu_link")
+FOOT_FORCES = Topic("foot_forces", FootForces, CONTROL, ("driver",), ("motion",), "four force cells a foot and the CoP")
+LEG_COMMAND = Topic("legs/joint_command", JointCommand, CONTROL, ("motion",), ("driver",), "to the 12 leg joints")
+HEAD_JOINT_COMMAND = Topic(
+    "head/joint_command", JointCommand, CONTROL, ("head",), ("driver",), "to head_pan and head_tilt"
+)
+FEATURES = Topic("features", Features, STATE, ("vision",), ("worldmodel",), "features of one picture, two angles each")
+VISION_PICTURE = Topic("vision/picture", Image, PICTURE, ("vision",), (), "picture with the features drawn in")
+ODOMETRY = Topic(
+    "odometry", Odometry, CONTROL, ("motion",), ("worldmodel", "vision"), "dead reckoning: base_link in odom"
+)
+MOTION_STATE = Topic("motion_state", MotionState, CONTROL, ("motion",), ("strategy",), "everything about the legs")
+WORLD_STATE = Topic("world_state", WorldState, STATE, ("worldmodel",), ("strategy",), "robot, ball and opponents")
+ROBOT_POSE = Topic(
+    "robot_pose", PoseWithCovarianceStamped, STATE, ("worldmodel",), (), "base_footprint in map, for standard viewers"
+)
+TF = Topic("tf", TFMessage, EVENTS, ("worldmodel", "motion"), (), "map to odom; odom to base_footprint to base_link")
+GAME_STATE = Topic("game_state", GameState, LATCHED, ("game_input",), ("strategy",), "the referee's view of the game")
+USER_COMMAND = Topic("user_command", UserCommand, LATCHED, ("user_input",), ("strategy",), "the user's last wish")
+WALK_COMMAND = Topic("walk_command", WalkCommand, CONTROL, ("strategy",), ("motion",), "velocity for the legs")
+HEAD_COMMAND = Topic("head_command", HeadCommand, CONTROL, ("strategy",), ("head",), "what the head shall look at")
+DECISION = Topic("decision", Decision, STATE, ("strategy",), (), "what strategy decided and why (behaviour tree)")
+ROBOT_DESCRIPTION = Topic("robot_description", String, LATCHED, ("driver",), (), "URDF of the robot, for viewers")
+DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, EVENTS, ALL_NODES, (), "health of each node, once a second")
+GROUND_TRUTH = Topic(
+    "ground_truth", GroundTruth, CONTROL, ("driver",), (), "what really is; no component that plays may listen"
+)
+CLOCK = Topic("/clock", Clock, Quality(depth=1), ("driver",), ALL_NODES, "time of the simulation, 50 Hz")
+
+TOPICS: tuple[Topic, ...] = (
+    CAMERA_IMAGE,
+    CAMERA_COMPRESSED,
+    CAMERA_INFO,
+    JOINT_STATES,
+    IMU,
+    FOOT_FORCES,
+    LEG_COMMAND,
+    HEAD_JOINT_COMMAND,
+    FEATURES,
+    VISION_PICTURE,
+    ODOMETRY,
+    MOTION_STATE,
+    WORLD_STATE,
+    ROBOT_POSE,
+    TF,
+    GAME_STATE,
+    USER_COMMAND,
+    WALK_COMMAND,
+    HEAD_COMMAND,
+    DECISION,
+    ROBOT_DESCRIPTION,
+    DIAGNOSTICS,
+    GROUND_TRUTH,
+    CLOCK,
+)
+
+RESET = Service("simulation/reset", Reset, "driver", "begin anew with a scenario and a seed")
+PLACE_BALL = Service("simulation/place_ball", PlaceBall, "driver", "put the ball somewhere")
+PUSH = Service("simulation/push", Push, "driver", "push the robot's trunk")
+SET_USER_COMMAND = Service("set_user_command", SetUserCommand, "user_input", "tell the robot what the user wants")
+START_RECORDING = Service("start_recording", StartRecording, "recorder", "begin a recording")
+STOP_RECORDING = Service("stop_recording", StopRecording, "recorder", "end the recording")
+KICK = Service("kick", Kick, "motion", "action: kick once with one foot")
+
+SERVICES: tuple[Service, ...] = (RESET, PLACE_BALL, PUSH, SET_USER_COMMAND, START_RECORDING, STOP_RECORDING, KICK)
+
+
+def published_by(node_name: str) -> Iterator[Topic]:
+    """Yield the topics that a node publishes."""
+    return (topic for topic in TOPICS if node_name in topic.publishers)
+
+
+def heard_by(node_name: str) -> Iterator[Topic]:
+    """Yield the topics that a node listens to."""
+    return (topic for topic in TOPICS if node_name in topic.subscribers)
+
+
+def markdown_tables() -> str:
+    """Return the tables of topics, and of services and actions, for the documentation."""
+    lines = ["| topic | type | quality of service | from | to | meaning |", "| --- | --- | --- | --- | --- | --- |"]
+    for topic in TOPICS:
+        senders, listeners = (
+            "all nodes" if nodes == ALL_NODES else ", ".join(nodes) or "tools only"
+            for nodes in (topic.publishers, topic.subscribers)
+        )
+        lines.append(
+            f"| `{topic.name}` | {topic.type_name} | {topic.quality} | {senders} | {listeners} | {topic.meaning} |"
+        )
+    lines += ["", "| service or action | type | server | meaning |", "| --- | --- | --- | --- |"]
+    lines += [f"| `{s.name}` | {s.type_name} | {s.server} | {s.meaning} |" for s in SERVICES]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,217 @@
+"""The whole robot in one process: the same cores as the graph, wired in the order of the data flow.
+
+Deterministic: the same scenario, settings and seed give the same trial, bit for bit, on one machine. What
+takes time in the graph takes as long here: a joint command acts one tick after the sensors that it
+answers, features arrive some ticks after their picture.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tulip_description.camera_pose import camera_in_footprint
+from tulip_description.field import Field, load_field
+from tulip_description.planar import Pose2D
+from tulip_description.robot import Robot, load_robot
+from tulip_description.robot_io import JointCommand
+from tulip_motion.head import HeadMovement, HeadParameters
+from tulip_motion.interface import HeadCommand, HeadMode, MotionState
+from tulip_motion.motion import Motion
+from tulip_motion.parameters import MotionParameters
+from tulip_sim.camera import CameraParameters, CameraRenderer
+from tulip_sim.parameters import WorldParameters
+from tulip_sim.referee import Outcome, Referee, RefereeParameters
+from tulip_sim.scenario import Scenario
+from tulip_sim.truth import Truth
+from tulip_sim.world import World
+from tulip_strategy.game_input import GameInput, GameInputParameters
+from tulip_strategy.interface import Decision, GameState, UserCommand, UserRequest
+from tulip_strategy.parameters import StrategyParameters
+from tulip_strategy.strategy import Strategy
+from tulip_vision.features import Features
+from tulip_vision.lens import Lens, head_camera_lens
+from tulip_vision.pipeline import Vision, VisionParameters
+from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParameters
+from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
+
+TICK = 4  # [ms] one control tick
+SLOW_TICKS = 5  # odometry, head and game input run at 50 Hz
+DECISION_TICKS = 10  # world state and strategy run at 25 Hz
+CAMERA_TICKS = 16  # 15.6 pictures a second
+FEATURE_DELAY_TICKS = 12  # 48 ms from the shutter to the features
+
+Picture = NDArray[np.uint8]
+Listener = Callable[[str, int, object], None]
+"""Is told everything that passes between components: topic name, stamp [ns], object."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Parameters of all cores."""
+
+    world: WorldParameters = field(default_factory=WorldParameters)
+    camera: CameraParameters = field(default_factory=CameraParameters)
+    referee: RefereeParameters = field(default_factory=RefereeParameters)
+    vision: VisionParameters = field(default_factory=VisionParameters)
+    worldmodel: WorldModelParameters = field(default_factory=WorldModelParameters)
+    motion: MotionParameters = field(default_factory=MotionParameters)
+    head: HeadParameters = field(default_factory=HeadParameters)
+    strategy: StrategyParameters = field(default_factory=StrategyParameters)
+    game_input: GameInputParameters = field(default_factory=GameInputParameters)
+
+
+class Lockstep:
+    """One robot, its world and a referee, advanced together tick by tick."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        seed: int,
+        settings: Settings | None = None,
+        listener: Listener | None = None,
+    ) -> None:
+        """Wire the cores.
+
+        Args:
+            scenario: What stands where at the start. The robot knows its own start pose, as its team would
+                tell it, and nothing else.
+            seed: Of everything random.
+            settings: Parameters of all cores.
+            listener: Told of every message that the graph would carry.
+        """
+        settings = settings or Settings()
+        robot_field: Field = load_field()
+        robot: Robot = load_robot()
+        lens: Lens = head_camera_lens()
+        self._tell = listener or (lambda topic, stamp, value: None)
+        self.world = World(scenario, settings.world, seed, robot_field, robot)
+        self.referee = Referee(settings.referee, robot_field)
+        self._camera = CameraRenderer(settings.camera, robot_field, robot, lens)
+        self._camera_rng = np.random.default_rng([seed, 1])
+        self.vision = Vision(settings.vision, lens)
+        self._poses = PoseBuffer(
+            PoseBufferParameters(), lambda height, turn, pan, tilt: camera_in_footprint(robot, height, turn, pan, tilt)
+        )
+        self.world_model = WorldModel(settings.worldmodel, robot_field, scenario.robot)
+        self.motion = Motion(settings.motion, robot)
+        self.head = HeadMovement(settings.head, robot)
+        self.strategy = Strategy(settings.strategy, robot_field)
+        self.game_input = GameInput(settings.game_input)
+        self.user = UserCommand(0, UserRequest.PLAY)
+        self._head_command = HeadCommand(0, HeadMode.HOLD)
+        self._pending: list[JointCommand] = []
+        self._pictures: deque[tuple[int, Picture]] = deque()
+        self._tick = 0
+        self.doing = ""
+        """Active path of the behaviour tree."""
+        self._tell("user_command", 0, self.user)
+        self.refused: list[str] = []
+        """Reasons of joint commands and kicks that were refused."""
+
+    @property
+    def stamp(self) -> int:
+        """Time since the start [ns]."""
+        return self.world.stamp
+
+    def step(self) -> None:
+        """Advance by one control tick."""
+        tick, tell = self._tick, self._tell
+        sensors = self.world.sensors()
+        for command in self._pending:
+            reason = self.world.apply(command)
+            if reason:
+                self.refused.append(reason)
+        self._pending = [self.motion.tick(sensors)]
+        tell("sensors", sensors.stamp, sensors)
+        tell("legs/joint_command", sensors.stamp, self._pending[0])
+        if tick % SLOW_TICKS == 0:
+            self._slow(sensors.stamp, sensors.joint_positions[12:])
+        if tick % CAMERA_TICKS == 0:
+            truth = self.world.truth()
+            picture = self._camera.render(truth, self._camera_rng)
+            self._pictures.append((truth.stamp, picture))
+            tell("camera/image_raw", truth.stamp, picture)
+        if self._pictures and self.stamp - self._pictures[0][0] >= FEATURE_DELAY_TICKS * TICK * 1_000_000:
+            self._see(*self._pictures.popleft())
+        if tick % DECISION_TICKS == 0:
+            self._decide(sensors.stamp)
+        self.world.advance(TICK)
+        truth = self.world.truth()
+        packet = self.referee.update(truth)
+        if packet is not None:
+            self.game_input.receive(packet, truth.stamp)
+            self._tell_game(truth.stamp)
+        self._tick += 1
+
+    def play(self, progress: Callable[[Lockstep], None] | None = None, limit: float = 200.0) -> Outcome | None:
+        """Play until the referee ends the trial.
+
+        Args:
+            progress: Called once in a simulated second.
+            limit: Longest time [s]; None is returned if the referee has not ended the trial by then.
+        """
+        every = round(1000 / TICK)
+        while self.referee.outcome is None and self.stamp < limit * 1e9:
+            self.step()
+            if progress is not None and self._tick % every == 0:
+                progress(self)
+        return self.referee.outcome
+
+    def _slow(self, stamp: int, head_positions: NDArray[np.float64]) -> None:
+        odometry = self.motion.odometry()
+        self.world_model.add_odometry(odometry)
+        self._poses.add_body(stamp, float(odometry.position[2]), odometry.orientation)
+        self._poses.add_head(stamp, float(head_positions[0]), float(head_positions[1]))
+        command = self.head.update(stamp, self._head_command, head_positions)
+        self._pending.append(command)
+        self._tell("odometry", stamp, odometry)
+        self._tell("motion_state", stamp, (self.motion.state(), odometry.distance))
+        self._tell("head/joint_command", stamp, command)
+        self._tell("ground_truth", stamp, (self.world.truth(), self.referee))
+
+    def _see(self, stamp: int, picture: Picture) -> None:
+        pose = self._poses.camera_in_footprint(stamp)
+        if isinstance(pose, MissingPose):
+            return
+        features: Features = self.vision.process(picture, stamp, pose)
+        self.world_model.add_features(features)
+        self._tell("features", stamp, features)
+
+    def _decide(self, stamp: int) -> None:
+        world = self.world_model.state(stamp)
+        game: GameState | None = self.game_input.state(stamp)
+        state: MotionState = self.motion.state()
+        decision: Decision = self.strategy.decide(stamp, world, game, self.user, state)
+        self.doing = decision.tree
+        self.motion.command(decision.walk)
+        self._head_command = decision.head
+        if decision.kick is not None:
+            reason = self.motion.start_kick(decision.kick)
+            if reason:
+                self.refused.append(f"kick: {reason}")
+        self._tell("world_state", stamp, world)
+        self._tell("walk_command", stamp, decision.walk)
+        self._tell("head_command", stamp, decision.head)
+        self._tell("decision", stamp, decision)
+
+    def _tell_game(self, stamp: int) -> None:
+        game = self.game_input.state(stamp)
+        if game is not None:
+            self._tell("game_state", stamp, game)
+
+
+def robot_pose(truth: Truth) -> Pose2D:
+    """Return base_footprint in map."""
+    return planar_pose(truth.base_position, truth.base_orientation)
+
+
+def planar_pose(position: Sequence[float] | NDArray[np.float64], orientation: Sequence[float] | NDArray[np.float64]) -> Pose2D:
+    """Return the pose on the ground of a position (x, y, ...) [m] and a quaternion x, y, z, w."""
+    x, y, z, w = orientation
+    yaw = float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    return Pose2D(float(position[0]), float(position[1]), yaw)

@@ -1,0 +1,92 @@
+"""Records a lockstep trial as the graph would: the same topics, types and serialization."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rclpy.serialization import serialize_message
+
+from tulip_description.robot import load_robot
+from tulip_motion.messages import (
+    body_transforms,
+    head_command_to_message,
+    joint_command_to_message,
+    motion_state_to_message,
+    odometry_to_message,
+    sensors_to_messages,
+    walk_command_to_message,
+)
+from tulip_ros import topics
+from tulip_ros.bag import Bag
+from tulip_ros.topics import Topic
+from tulip_sim.messages import jpeg_to_message, truth_to_message
+from tulip_strategy.messages import decision_to_message, game_state_to_message, user_command_to_message
+from tulip_vision.messages import features_to_message
+from tulip_worldmodel.messages import map_to_odom_message, robot_pose_to_message, world_state_to_message
+
+Messages = Iterable[tuple[Topic, Any]]
+
+
+class LockstepRecording:
+    """Writes what passes between the cores into a recording.
+
+    Pictures go in compressed, as `camera/image_raw/compressed`; times are simulated times.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Begin a recording.
+
+        Args:
+            folder: New folder for it.
+
+        Raises:
+            BadInputError: if it cannot be written.
+        """
+        self._bag = Bag(folder)
+        self.path = self._bag.path
+        cells = np.array([foot.cells for foot in load_robot().feet])
+        self._converters: dict[str, Callable[[int, Any], Messages]] = {
+            "sensors": lambda stamp, value: zip(
+                (topics.JOINT_STATES, topics.IMU, topics.FOOT_FORCES), sensors_to_messages(value, cells), strict=True
+            ),
+            "camera/image_raw": lambda stamp, value: [(topics.CAMERA_COMPRESSED, jpeg_to_message(value, stamp))],
+            "legs/joint_command": lambda stamp, value: [(topics.LEG_COMMAND, joint_command_to_message(value))],
+            "head/joint_command": lambda stamp, value: [(topics.HEAD_JOINT_COMMAND, joint_command_to_message(value))],
+            "features": lambda stamp, value: [(topics.FEATURES, features_to_message(value))],
+            "odometry": lambda stamp, value: [
+                (topics.ODOMETRY, odometry_to_message(value)),
+                (topics.TF, body_transforms(value)),
+            ],
+            "motion_state": lambda stamp, value: [(topics.MOTION_STATE, motion_state_to_message(*value))],
+            "world_state": lambda stamp, value: [
+                (topics.WORLD_STATE, world_state_to_message(value)),
+                (topics.ROBOT_POSE, robot_pose_to_message(value)),
+                (topics.TF, map_to_odom_message(value)),
+            ],
+            "game_state": lambda stamp, value: [(topics.GAME_STATE, game_state_to_message(value))],
+            "user_command": lambda stamp, value: [(topics.USER_COMMAND, user_command_to_message(value))],
+            "walk_command": lambda stamp, value: [(topics.WALK_COMMAND, walk_command_to_message(value))],
+            "head_command": lambda stamp, value: [(topics.HEAD_COMMAND, head_command_to_message(value))],
+            "decision": lambda stamp, value: [(topics.DECISION, decision_to_message(value))],
+            "ground_truth": lambda stamp, value: [(topics.GROUND_TRUTH, truth_to_message(*value))],
+        }
+
+    def write(self, topic: str, stamp: int, value: object) -> None:
+        """Write what was told on a topic at a stamp [ns].
+
+        Raises:
+            KeyError: for a topic that has no message.
+            OSError: if the file cannot be written.
+        """
+        for entry, message in self._converters[topic](stamp, value):
+            name = entry.name if entry.name.startswith("/") else f"/{entry.name}"
+            self._bag.add_topic(name, entry.type_name, entry.quality)
+            self._bag.write(name, serialize_message(message), stamp)
+        self._bag.flush()
+
+    def close(self) -> None:
+        """End the recording."""
+        self._bag.close()

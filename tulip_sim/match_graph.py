@@ -1,0 +1,152 @@
+"""A trial as a ROS 2 graph: every component a process of its own, watched from outside."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tulip_description.field import load_field
+from tulip_description.planar import Pose2D
+from tulip_msgs.msg import Decision, GroundTruth, WorldState
+from tulip_ros import topics
+from tulip_ros.errors import BadInputError
+from tulip_ros.launch import Launcher
+from tulip_ros.plan import make_plan
+from tulip_ros.run import ComponentNode, session
+from tulip_ros.time import stamp_of
+from tulip_sim.lockstep import planar_pose
+from tulip_sim.scenario import make_scenario
+from tulip_sim.trial import TrialObserver, TrialSummary
+from tulip_strategy.game_controller import REFEREE_PORT
+
+NODES = ("vision", "worldmodel", "head", "motion", "strategy", "game_input", "user_input")
+LOOK = 0.1  # [s] between two looks at the processes
+SILENCE = 60.0  # [s] of wall-clock time without news from the simulator after which the trial is given up
+ENDING = 0.5  # [s] of wall-clock time that the recording goes on after the end
+UNRECORDED = ("/(.*/)?camera/image_raw", "/(.*/)?vision/picture")
+"""Pictures go into the recording compressed."""
+
+Progress = Callable[[float, str], None]
+"""Is told simulated time [s] and what the robot is doing."""
+
+
+class TrialWatcher(ComponentNode):
+    """Follows a trial from the ground truth; no component that plays."""
+
+    def __init__(self) -> None:
+        """Connect."""
+        super().__init__("trial_watcher")
+        self.observer = TrialObserver()
+        self.truth: GroundTruth | None = None
+        self.doing = ""
+        self.heard = time.monotonic()
+        self.first: tuple[float, int] | None = None
+        self.listen(topics.GROUND_TRUTH, self._on_truth)
+        self.listen(topics.WORLD_STATE, self._on_world_state)
+        self.listen(topics.DECISION, self._on_decision)
+
+    def _on_truth(self, message: GroundTruth) -> None:
+        self.truth, self.heard = message, time.monotonic()
+        if self.first is None:
+            self.first = (self.heard, stamp_of(message))
+        pose, turn = message.robot.position, message.robot.orientation
+        self.observer.see_truth(planar_pose((pose.x, pose.y), (turn.x, turn.y, turn.z, turn.w)))
+
+    def _on_world_state(self, message: WorldState) -> None:
+        self.observer.see_estimate(Pose2D(*(float(value) for value in message.robot_pose)))
+
+    def _on_decision(self, message: Decision) -> None:
+        self.doing = message.tree
+
+    @property
+    def stamp(self) -> int:
+        """Newest simulated time [ns]."""
+        return stamp_of(self.truth) if self.truth is not None else 0
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated time by wall-clock time since the first truth."""
+        if self.first is None or self.heard <= self.first[0]:
+            return float("nan")
+        return (self.stamp - self.first[1]) * 1e-9 / (self.heard - self.first[0])
+
+
+def play_graph(
+    seed: int,
+    scenario: str = "trial",
+    record: Path | None = None,
+    progress: Progress | None = None,
+    say: Callable[[str], None] = print,
+    parameter_files: Sequence[Path] = (),
+    values: Mapping[str, Mapping[str, Any]] | None = None,
+    referee_port: int = REFEREE_PORT,
+    logs: Path | None = None,
+) -> TrialSummary:
+    """Play one trial.
+
+    Args:
+        seed: Of the scenario and of all noise.
+        scenario: Name of the scenario.
+        record: New folder for the recording, or None for none.
+        progress: Told several times a second.
+        say: Told what happens to the processes, a line each.
+        parameter_files: YAML files for the nodes.
+        values: Parameters by node name, which win over the files.
+        referee_port: UDP port between referee and game input.
+        logs: Folder for one log file a node.
+
+    Raises:
+        BadInputError: if a node refuses what it was given, or the simulator falls silent.
+    """
+    start = make_scenario(scenario, np.random.default_rng(seed), load_field()).robot
+    given: dict[str, dict[str, Any]] = {
+        "driver": {"scenario": scenario, "seed": seed, "referee_port": referee_port, "wait_for": list(NODES)},
+        # The team tells its robot where it was put down, as people do on the real field.
+        "worldmodel": {"start_x": start.x, "start_y": start.y, "start_yaw": start.yaw},
+        "game_input": {"port": referee_port},
+        "user_input": {"autostart": True},
+    }
+    nodes = list(NODES)
+    if record is not None:
+        nodes.append("recorder")
+        given["recorder"] = {"path": str(record.absolute()), "exclude": list(UNRECORDED)}
+        given["driver"]["wait_for"] = list(nodes)
+    for name, own in (values or {}).items():
+        given.setdefault(name, {}).update(own)
+    plan = make_plan(nodes, "sim", parameter_files=parameter_files, values=given)
+    with (
+        Launcher(plan, logs) as launcher,
+        session(TrialWatcher, arguments=[], handle_signals=False) as (watcher, spin),
+    ):
+        end: float | None = None
+        while end is None or time.monotonic() < end:
+            spin(LOOK)
+            for line in launcher.poll():
+                say(line)
+            if progress is not None:
+                progress(watcher.stamp * 1e-9, watcher.doing)
+            if time.monotonic() - watcher.heard > SILENCE:
+                raise BadInputError(f"The simulator has said nothing for {SILENCE:.0f} s; see {launcher.log_folder}.")
+            if end is None and watcher.truth is not None and watcher.truth.outcome:
+                end = time.monotonic() + ENDING
+        truth = watcher.truth
+        assert truth is not None
+        return TrialSummary(
+            mode="graph",
+            seed=seed,
+            outcome=truth.outcome,
+            time=truth.trial_time,
+            touches=truth.touches,
+            falls=truth.falls,
+            distance_walked=watcher.observer.distance,
+            localization_error=watcher.observer.localization_error,
+            heading_error=watcher.observer.heading_error,
+            real_time_factor=watcher.real_time_factor,
+            recording=str(record / f"{record.name}.mcap") if record is not None else "",
+        )
+
+

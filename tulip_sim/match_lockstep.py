@@ -1,0 +1,74 @@
+"""A trial in lockstep: one process, deterministic, as fast as it can."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from tulip_description.field import load_field
+from tulip_sim.lockstep import Lockstep, Settings, robot_pose
+from tulip_sim.lockstep_recording import LockstepRecording
+from tulip_sim.scenario import make_scenario
+from tulip_sim.trial import TrialObserver, TrialSummary
+
+Progress = Callable[[float, str], None]
+"""Is told simulated time [s] and what the robot is doing."""
+
+
+def play_lockstep(
+    seed: int,
+    scenario: str = "trial",
+    settings: Settings | None = None,
+    record: Path | None = None,
+    progress: Progress | None = None,
+) -> TrialSummary:
+    """Play one trial.
+
+    Args:
+        seed: Of the scenario and of all noise.
+        scenario: Name of the scenario.
+        settings: Parameters of all cores.
+        record: New folder for the recording, or None for none.
+        progress: Told once in a simulated second.
+
+    Raises:
+        BadInputError: if the recording cannot be written.
+    """
+    observer = TrialObserver()
+    recording = LockstepRecording(record) if record else None
+
+    def listen(topic: str, stamp: int, value: object) -> None:
+        if recording is not None:
+            recording.write(topic, stamp, value)
+
+    begin = time.monotonic()
+    try:
+        trial = Lockstep(make_scenario(scenario, np.random.default_rng(seed), load_field()), seed, settings, listen)
+
+        def watch(now: Lockstep) -> None:
+            observer.see_truth(robot_pose(now.world.truth()))
+            observer.see_estimate(now.world_model.state(now.stamp).robot.pose)
+            if progress is not None:
+                progress(now.stamp * 1e-9, now.doing)
+
+        outcome = trial.play(watch)
+    finally:
+        if recording is not None:
+            recording.close()
+    truth = trial.world.truth()
+    return TrialSummary(
+        mode="lockstep",
+        seed=seed,
+        outcome=outcome.result.value if outcome else "unfinished",
+        time=trial.referee.played,
+        touches=sum(truth.foot_touches) + truth.body_touches,
+        falls=trial.referee.falls,
+        distance_walked=observer.distance,
+        localization_error=observer.localization_error,
+        heading_error=observer.heading_error,
+        real_time_factor=trial.stamp * 1e-9 / (time.monotonic() - begin),
+        recording=str(recording.path) if recording else "",
+    )

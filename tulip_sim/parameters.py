@@ -1,0 +1,132 @@
+"""Parameters of the simulated world: what is uncertain about it, and how its sensors err."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class SensorParameters:
+    """Errors of the sensors. Standard deviations unless said otherwise; all assumed, from ordinary components."""
+
+    period: int = 4  # [ms] one reading of the whole body per control tick
+    encoder_step: float = 1e-4  # [rad] resolution of a 16-bit encoder at the joint
+    encoder_noise: float = 1e-4  # [rad]
+    velocity_noise: float = 0.02  # [rad/s] of the motor-side encoder, differentiated over 1 ms
+    gyro_noise: float = 0.005  # [rad/s] per reading
+    gyro_bias: float = 0.002  # [rad/s] constant in a run
+    accelerometer_noise: float = 0.05  # [m/s^2]
+    accelerometer_bias: float = 0.02  # [m/s^2] constant in a run
+    attitude_noise: float = 0.001  # [rad] of the IMU's own orientation estimate, white
+    attitude_bias: float = 0.003  # [rad] roll and pitch, constant in a run: mounting
+    yaw_drift: float = 0.0003  # [rad/s] constant in a run: about 1 degree per minute without a magnetometer
+    cell_noise: float = 1.0  # [N]
+    cell_step: float = 0.5  # [N] resolution
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ValueError: if one is negative or not finite.
+        """
+        for name, value in vars(self).items():
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} is {value}; expected a finite number >= 0")
+        if self.period < 1:
+            raise ValueError(f"period is {self.period} ms; expected >= 1")
+
+
+@dataclass(frozen=True)
+class DriverParameters:
+    """Behaviour of the joint driver."""
+
+    time_to_live: int = 100  # [ms] of a command; long enough for a garbage collection, short against a fall of 0.5 s
+    damping_time: int = 500  # [ms] after that: damping only, so that the robot sinks instead of dropping
+    # Of each leg joint from the hip down. The ankle roll carries only 0.0006 kg m^2: much more is unstable at 1 kHz.
+    damping: tuple[float, ...] = (1.0, 4.0, 4.0, 4.0, 1.0, 0.2)  # [N m s/rad]
+    head_damping: float = 0.05  # [N m s/rad]
+    full_torque_speed: float = 0.8  # share of the top speed up to which full torque is there; it falls to 0 at the top
+    # Until the first command the legs hold the start posture with these gains, which carry the robot in double support.
+    hold_stiffness: tuple[float, ...] = (150.0, 400.0, 400.0, 400.0, 200.0, 200.0)  # [N m/rad] [trial]
+    hold_damping: tuple[float, ...] = (3.0, 8.0, 8.0, 8.0, 2.0, 0.4)  # [N m s/rad] [trial]
+    head_hold: tuple[float, float] = (20.0, 0.3)  # [N m/rad], [N m s/rad]
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ValueError: if one is out of its range.
+        """
+        for name in ("damping", "hold_stiffness", "hold_damping"):
+            values = getattr(self, name)
+            if len(values) != 6 or min(values) < 0.0:
+                raise ValueError(f"{name} is {values}; expected six numbers >= 0, from hip yaw to ankle roll")
+        if self.time_to_live < 1 or self.damping_time < 0:
+            raise ValueError(
+                f"time_to_live is {self.time_to_live} ms, damping_time {self.damping_time} ms; expected >= 1 and >= 0"
+            )
+        if not 0.0 < self.full_torque_speed < 1.0:
+            raise ValueError(f"full_torque_speed is {self.full_torque_speed}; expected between 0 and 1")
+
+
+@dataclass(frozen=True)
+class WorldParameters:
+    """The physical world. Ranges are drawn from once, when a world is made, by its seed."""
+
+    friction: tuple[float, float] = (0.6, 1.0)  # range of the friction coefficient on the carpet
+    mass_spread: float = 0.05  # each link's mass and inertia: +- this share
+    joint_friction: tuple[float, float] = (0.0, 0.01)  # range of each joint's dry friction, share of its torque limit
+    joint_friction_speed: float = 1.0  # [rad/s] over which dry friction builds up: a step of 1 ms needs it smooth
+    sensor_delay: tuple[int, int] = (0, 2)  # [ms] range, from measuring to reading; an answer waits 4 ms more
+    ball_mass: float = 0.43  # [kg]
+    ball_rolling_deceleration: float = 0.35  # [m/s^2] of a ball rolling on carpet; assumed: 2 m/s carries 5.7 m
+    ball_stiffness: float = 1.5e4  # [N/m] of contacts with the ball; bounces as a ball does [trial]
+    ball_damping: float = 8.0  # [N s/m] [trial]
+    net_stiffness: float = 2.0e3  # [N/m] a net gives way
+    net_damping: float = 100.0  # [N s/m] and takes the ball's speed: overdamped with this ball
+    solver_iterations: int = 50  # [trial]
+    sensors: SensorParameters = field(default_factory=SensorParameters)
+    driver: DriverParameters = field(default_factory=DriverParameters)
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ValueError: if one is out of its range.
+        """
+        for name in ("friction", "joint_friction", "sensor_delay"):
+            low, high = getattr(self, name)
+            if not 0.0 <= low <= high:
+                raise ValueError(f"{name} is ({low}, {high}); expected 0 <= low <= high")
+        if self.friction[0] <= 0.0:
+            raise ValueError(f"friction begins at {self.friction[0]}; expected > 0")
+        if not 0.0 <= self.mass_spread < 1.0:
+            raise ValueError(f"mass_spread is {self.mass_spread}; expected in [0, 1)")
+        for name in ("ball_mass", "ball_stiffness", "net_stiffness", "solver_iterations", "joint_friction_speed"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected > 0")
+        for name in ("ball_rolling_deceleration", "ball_damping", "net_damping"):
+            if not getattr(self, name) >= 0:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected >= 0")
+
+    @classmethod
+    def exact(cls) -> WorldParameters:
+        """Return a world without randomness: nominal masses, friction 0.8, no joint friction, sensors without error."""
+        sensors = SensorParameters(
+            encoder_step=0.0,
+            encoder_noise=0.0,
+            velocity_noise=0.0,
+            gyro_noise=0.0,
+            gyro_bias=0.0,
+            accelerometer_noise=0.0,
+            accelerometer_bias=0.0,
+            attitude_noise=0.0,
+            attitude_bias=0.0,
+            yaw_drift=0.0,
+            cell_noise=0.0,
+            cell_step=0.0,
+        )
+        return cls(
+            friction=(0.8, 0.8), mass_spread=0.0, joint_friction=(0.0, 0.0), sensor_delay=(0, 0), sensors=sensors
+        )

@@ -1,0 +1,284 @@
+"""The referee of a dribble-and-kick trial: judges from the ground truth and writes version 7 packets."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from tulip_description.field import Field, Goal
+from tulip_sim.truth import Truth
+from tulip_strategy.game_controller import Packet, Player, Team, TeamColour, encode
+from tulip_strategy.interface import GamePhase
+
+SECOND = 10**9  # [ns]
+PLAYERS = (11, 10)  # of the two teams in a packet of version 7
+PENALTY_SHOOT = 1  # secondary state: the nearest that version 7 has to dribble and kick
+YELLOW_GOAL = 1
+MOST_PENALTY_SHOTS = 5  # trials a side, one bit each
+
+
+@dataclass(frozen=True)
+class RefereeParameters:
+    """Times and rules of a trial."""
+
+    initial_time: float = 1.0  # [s] short: nobody places robots by hand; a real game takes longer
+    ready_time: float = 2.0  # [s] 30 in a real game
+    set_time: float = 2.0  # [s] time enough to see the ball
+    playing_time: float = 150.0  # [s] of a trial, by the rules of 2013
+    packet_period: float = 0.5  # [s] 2 Hz, as the referee program sends
+    ends_when_ball_is_out: bool = True  # as in dribble and kick; else the ball is expected to be put back
+    lying_limit: float = 30.0  # [s] a robot that lies this long does not get up any more
+    lying_tilt: float = 1.0  # [rad] of the trunk; no gait leans half as far
+    team_number: int = 25
+    player_number: int = 1
+    team_colour: TeamColour = TeamColour.MAGENTA
+    opponent_number: int = 12
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ValueError: if one is out of its range.
+        """
+        for name in ("initial_time", "ready_time", "set_time"):
+            if not 0.0 <= getattr(self, name) < 3600.0:
+                raise ValueError(f"{name} is {getattr(self, name)} s; expected 0 to 3600")
+        for name in ("playing_time", "packet_period", "lying_limit"):
+            if not 0.0 < getattr(self, name) < 36000.0:
+                raise ValueError(f"{name} is {getattr(self, name)} s; expected > 0 and at most ten hours")
+        if not 0.0 < self.lying_tilt < math.pi:
+            raise ValueError(f"lying_tilt is {self.lying_tilt} rad; expected between 0 and pi")
+        for name in ("team_number", "opponent_number"):
+            if not 0 <= getattr(self, name) <= 255:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected 0 to 255")
+        if self.team_number == self.opponent_number:
+            raise ValueError(f"team_number and opponent_number are both {self.team_number}; expected two numbers")
+        if not 1 <= self.player_number <= min(PLAYERS):
+            raise ValueError(f"player_number is {self.player_number}; expected 1 to {min(PLAYERS)}")
+        if self.team_colour not in (TeamColour.CYAN, TeamColour.MAGENTA):
+            raise ValueError(f"team_colour is {self.team_colour}; expected CYAN or MAGENTA")
+
+
+class Result(Enum):
+    """How a trial ended."""
+
+    GOAL = "goal"
+    OWN_GOAL = "own goal"
+    OUT = "out"
+    TIME = "time"
+    FALLEN = "fallen"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The end of a trial.
+
+    Attributes:
+        result: See `Result`.
+        seconds: Played until then [s].
+        foot_touches: How often a foot met the ball.
+        body_touches: How often another part of the robot did.
+        keeper_touches: How often the keeper did.
+        falls: How often the robot went from upright to lying.
+    """
+
+    result: Result
+    seconds: float
+    foot_touches: int
+    body_touches: int
+    keeper_touches: int
+    falls: int
+
+
+class Referee:
+    """Runs one trial after the other and keeps the score. Give it the truth at every control tick."""
+
+    def __init__(self, parameters: RefereeParameters, field: Field) -> None:
+        self._parameters = parameters
+        self._field = field
+        self._score = [0, 0]
+        self._shots = 0
+        self._trials = 0
+        self._begin: int | None = None
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin a new trial with the next truth; the score stays. Its stamps may begin anew."""
+        self._begin = None
+        self._now = 0
+        self._next_packet = 0
+        self._told: GamePhase | None = None
+        self._outcome: Outcome | None = None
+        self._lying_since: int | None = None
+        self._falls = 0
+        self._was_out = False
+        self._outs = 0
+        self._penalty: tuple[int, int] | None = None
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """How the trial ended, None while it runs."""
+        return self._outcome
+
+    @property
+    def score(self) -> tuple[int, int]:
+        """Goals of the striker's team and of the other."""
+        return self._score[0], self._score[1]
+
+    @property
+    def outs(self) -> int:
+        """How often the ball left the field during play."""
+        return self._outs
+
+    @property
+    def falls(self) -> int:
+        """How often the robot fell since the trial's start."""
+        return self._falls
+
+    @property
+    def lying(self) -> bool:
+        """Whether the robot lies on the ground."""
+        return self._lying_since is not None
+
+    @property
+    def phase(self) -> GamePhase:
+        """The game's phase at the last truth."""
+        if self._outcome is not None:
+            return GamePhase.FINISHED
+        elapsed = self._elapsed()
+        parameters = self._parameters
+        for phase, duration in (
+            (GamePhase.INITIAL, parameters.initial_time),
+            (GamePhase.READY, parameters.ready_time),
+            (GamePhase.SET, parameters.set_time),
+        ):
+            if elapsed < duration:
+                return phase
+            elapsed -= duration
+        return GamePhase.PLAYING
+
+    @property
+    def played(self) -> float:
+        """Time since the beginning of play [s]; what it was at the end once the trial is over."""
+        return self._outcome.seconds if self._outcome is not None else self._playing_time()
+
+    def penalise(self, penalty: int, seconds: float) -> None:
+        """Penalise the striker for a time [s]; penalty 0 ends a penalty."""
+        self._penalty = None if penalty == 0 else (penalty, self._now + round(seconds * SECOND))
+
+    def update(self, truth: Truth) -> bytes | None:
+        """Judge what is, and return the packet that is due, if one is."""
+        if self._begin is None:
+            self._begin = self._next_packet = truth.stamp
+        self._now = truth.stamp
+        if self._penalty is not None and self._now >= self._penalty[1]:
+            self._penalty = None
+        self._watch_robot(truth)
+        if self.phase is GamePhase.PLAYING:
+            self._judge(truth)
+        if self._now < self._next_packet and self.phase is self._told:
+            return None
+        self._told = self.phase
+        while self._next_packet <= self._now:
+            self._next_packet += round(self._parameters.packet_period * SECOND)
+        return self.packet()
+
+    def packet(self) -> bytes:
+        """Return the packet for the present state."""
+        parameters = self._parameters
+        own = TeamColour(parameters.team_colour)
+        other = TeamColour.CYAN if own is TeamColour.MAGENTA else TeamColour.MAGENTA
+        players = [Player()] * PLAYERS[0]
+        if self._penalty is not None:
+            code, until = self._penalty
+            players[parameters.player_number - 1] = Player(code, math.ceil((until - self._now) / SECOND))
+        return encode(
+            Packet(
+                version=7,
+                players_per_team=1,
+                state=self.phase,
+                first_half=1,
+                kick_off=own,
+                secondary_state=PENALTY_SHOOT,
+                drop_in_team=own,
+                drop_in_time=-1,
+                seconds_remaining=math.ceil(parameters.playing_time - self.played),
+                teams=(
+                    Team(parameters.team_number, own, YELLOW_GOAL, self._score[0] & 0xFF, tuple(players)),
+                    Team(
+                        parameters.opponent_number, other, YELLOW_GOAL, self._score[1] & 0xFF, (Player(),) * PLAYERS[1]
+                    ),
+                ),
+                penalty_shots=(self._shots & 0xFF, 0),
+                sub_time=math.ceil(self._phase_left()),
+            )
+        )
+
+    def _elapsed(self) -> float:
+        return 0.0 if self._begin is None else (self._now - self._begin) / SECOND
+
+    def _preparation(self) -> float:
+        return self._parameters.initial_time + self._parameters.ready_time + self._parameters.set_time
+
+    def _playing_time(self) -> float:
+        return max(0.0, self._elapsed() - self._preparation())
+
+    def _phase_left(self) -> float:
+        """Time left of the ready or set phase [s], else 0."""
+        parameters, phase = self._parameters, self.phase
+        if phase is GamePhase.READY:
+            return parameters.initial_time + parameters.ready_time - self._elapsed()
+        return self._preparation() - self._elapsed() if phase is GamePhase.SET else 0.0
+
+    def _watch_robot(self, truth: Truth) -> None:
+        x, y, _, _ = truth.base_orientation
+        upright = 1.0 - 2.0 * float(x * x + y * y)  # vertical part of the trunk's own z axis
+        if math.acos(max(-1.0, min(1.0, upright))) <= self._parameters.lying_tilt:
+            self._lying_since = None
+        elif self._lying_since is None:
+            self._lying_since = truth.stamp
+            self._falls += 1
+
+    def _judge(self, truth: Truth) -> None:
+        lying = self._lying_since is not None and truth.stamp - self._lying_since
+        if self._in_goal(truth, self._field.opponent_goal):
+            self._score[0] += 1
+            self._shots |= 1 << min(self._trials, MOST_PENALTY_SHOTS - 1)
+            self._end(Result.GOAL, truth)
+        elif self._in_goal(truth, self._field.own_goal):
+            self._score[1] += 1
+            self._end(Result.OWN_GOAL, truth)
+        elif self._leaves_field(truth) and self._parameters.ends_when_ball_is_out:
+            self._end(Result.OUT, truth)
+        elif lying and lying >= self._parameters.lying_limit * SECOND:
+            self._end(Result.FALLEN, truth)
+        elif self._playing_time() >= self._parameters.playing_time:
+            self._end(Result.TIME, truth)
+
+    def _in_goal(self, truth: Truth, goal: Goal) -> bool:
+        """Tell whether the ball is wholly over the goal line, between the posts and under the bar."""
+        x, y, z = (float(value) for value in truth.ball_position)
+        over = goal.outward * (x - goal.x) - self._field.ball_radius > 0.5 * self._field.line_width
+        return over and goal.outward * x < goal.outward * goal.back and abs(y) < 0.5 * goal.width and z < goal.height
+
+    def _leaves_field(self, truth: Truth) -> bool:
+        """Tell whether the ball has just gone wholly over an outer line."""
+        edge = self._field.ball_radius + 0.5 * self._field.line_width
+        x, y = abs(float(truth.ball_position[0])), abs(float(truth.ball_position[1]))
+        out = x > 0.5 * self._field.length + edge or y > 0.5 * self._field.width + edge
+        leaves = out and not self._was_out
+        self._was_out = out
+        self._outs += leaves
+        return leaves
+
+    def _end(self, result: Result, truth: Truth) -> None:
+        self._outcome = Outcome(
+            result,
+            self._playing_time(),
+            sum(truth.foot_touches),
+            truth.body_touches,
+            truth.keeper_touches,
+            self._falls,
+        )
+        self._trials += 1

@@ -1,0 +1,59 @@
+"""Sends the referee's packets over real UDP and collects the robots' replies."""
+
+from __future__ import annotations
+
+import socket
+
+from tulip_strategy.game_controller import REFEREE_PORT, Rejected, Reply, decode_reply
+
+MOST_REPLIES = 100  # at a time: a flood must not stop the simulation
+REPLY_SIZE = 512  # [B] more than any reply has
+
+
+class RefereeSocket:
+    """A UDP socket that speaks as the referee program does."""
+
+    def __init__(self, address: str = "127.0.0.1", port: int = REFEREE_PORT) -> None:
+        """Open the socket.
+
+        Args:
+            address: Where robots listen; a broadcast address reaches all robots of a network.
+            port: Their port.
+        """
+        self._target = (address, port)
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        self._socket.setblocking(False)
+        self.lost = 0
+        """Packets that the system did not take."""
+
+    def send(self, packet: bytes) -> None:
+        """Send a packet; a network that does not take it is counted, since the next one follows soon."""
+        try:
+            self._socket.sendto(packet, self._target)
+        except OSError:
+            self.lost += 1
+
+    def replies(self) -> list[Reply | Rejected]:
+        """Return what robots have sent since the last time."""
+        received: list[Reply | Rejected] = []
+        while len(received) < MOST_REPLIES:
+            try:
+                received.append(decode_reply(self._socket.recv(REPLY_SIZE)))
+            except BlockingIOError:
+                break
+            except ConnectionRefusedError:
+                continue  # the system's notice that nobody listened to a packet sent before
+        return received
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+    def __enter__(self) -> RefereeSocket:
+        """Return the socket itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the socket."""
+        self.close()

@@ -1,0 +1,55 @@
+"""The ground truth: what really is, for renderer, referee, reports and tests; never for a component that plays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tulip_description.planar import Pose2D
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The state of the whole world at one instant; all in map unless said otherwise.
+
+    Attributes:
+        stamp: Time since the world's start [ns].
+        base_position: (3,) of base_link [m].
+        base_orientation: (4,) quaternion x, y, z, w of base_link.
+        base_linear_velocity: (3,) of base_link's origin [m/s].
+        base_angular_velocity: (3,) [rad/s].
+        joint_positions: (14,) [rad], order of `tulip_description.robot.JOINTS`.
+        joint_velocities: (14,) [rad/s].
+        ball_position: (3,) centre of the ball [m].
+        ball_orientation: (4,) quaternion x, y, z, w.
+        ball_linear_velocity: (3,) [m/s].
+        ball_angular_velocity: (3,) [rad/s].
+        keeper: Where the keeper stands, or None without one.
+        keeper_path: Points between which the keeper goes to and fro [m]; empty for one that stands.
+        foot_touches: How often the left and the right foot have met the ball.
+        body_touches: How often any other part of the robot has met the ball.
+        keeper_touches: How often the keeper has met the ball.
+        poles: Whether the landmark poles stand.
+    """
+
+    stamp: int
+    base_position: Array
+    base_orientation: Array
+    base_linear_velocity: Array
+    base_angular_velocity: Array
+    joint_positions: Array
+    joint_velocities: Array
+    ball_position: Array
+    ball_orientation: Array
+    ball_linear_velocity: Array
+    ball_angular_velocity: Array
+    keeper: Pose2D | None
+    keeper_path: tuple[tuple[float, float], ...]
+    foot_touches: tuple[int, int]
+    body_touches: int
+    keeper_touches: int
+    poles: bool

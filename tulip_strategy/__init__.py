@@ -1,0 +1,1 @@
+"""Game state, user commands and behaviour."""

@@ -1,0 +1,1 @@
+"""The behaviour tree, one idea a file."""

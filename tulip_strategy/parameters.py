@@ -1,0 +1,134 @@
+"""Every number of the strategy, with its unit and why it has this value."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+_SIGNED = frozenset({"ready_x", "ready_y", "ready_yaw", "dribble_lateral"})
+
+
+@dataclass(frozen=True)
+class StrategyParameters:
+    """Numbers of the strategy. Distances to the ball run from base_footprint to the ball's centre."""
+
+    # Walking: what is asked of the legs.
+    forward_speed: float = 0.4  # [m/s] walks 60 s without a fall at this speed
+    backward_speed: float = 0.2  # [m/s] as measured for the gait
+    sideways_speed: float = 0.15  # [m/s] beyond this the heading drifts
+    turning_speed: float = 0.8  # [rad/s] leaves a margin to the 1.0 rad/s that the gait can do
+    forward_acceleration: float = 0.3  # [m/s^2] full speed within about three steps
+    sideways_acceleration: float = 0.3  # [m/s^2]
+    turning_acceleration: float = 1.5  # [rad/s^2]
+    position_gain: float = 0.9  # [1/s] speed per distance left; with 0.3 s of lag of the legs it does not overshoot
+    heading_gain: float = 1.2  # [1/s] turning rate per heading error
+
+    # Way round the ball.
+    ball_clearance: float = 0.50  # [m] reach of a toe's corner (0.29) + ball (0.094) + error of the ball's place
+    standoff: float = 0.58  # [m] behind the ball, where the approach ends: just outside the clearance
+    arc_ahead: float = 0.6  # [rad] how far ahead on the circle round the ball the robot aims
+    face_travel_distance: float = 0.8  # [m] with more left to go it faces its way, since forward is the fastest
+    opponent_clearance: float = 0.7  # [m] half a keeper (0.25), the own half width (0.3), a margin
+
+    # Standing behind the ball: begin inside the first, end outside the second of each pair.
+    behind_offset: float = 0.12  # [m] sideways, on the ball
+    behind_offset_end: float = 0.25  # [m]
+    behind_cone: float = 0.15  # [rad] more offset the farther the ball is away
+    behind_cone_end: float = 0.35  # [rad]
+    behind_heading: float = 0.35  # [rad] error of the robot's heading
+    behind_heading_end: float = 0.8  # [rad]
+    behind_reach: float = 1.0  # [m] ball no farther ahead than this
+    behind_reach_end: float = 1.8  # [m] a dribbled ball rolls half a metre to a metre
+    behind_nearest: float = 0.18  # [m] nearer, the ball is beside or under the robot: come round again
+
+    # Dribbling.
+    dribble_speed: float = 0.25  # [m/s] ball stays within a metre
+    dribble_chase_speed: float = 0.35  # [m/s] while the ball is out of reach
+    dribble_contact: float = 0.48  # [m] toe (0.217) + ball (0.094) + a stride and the lag of the legs
+    dribble_lateral: float = 0.0  # [m] where the ball shall lie, positive left; 0 is between the toes
+    dribble_offset: float = 0.09  # [m] ball farther off is not touched but lined up first
+    dribble_heading: float = 0.3  # [rad] same, for the heading
+    near_gain: float = 1.3  # [1/s] speed per offset next to the ball; a drifting gait leaves drift / gain of error
+
+    # Kicking.
+    kick_ahead: float = 0.34  # [m] ball's centre at the kick: toe (0.217) + ball (0.094) + 30 mm not to touch it
+    kick_lateral: float = 0.12  # [m] of the kicking foot's middle, half the stance width
+    kick_ahead_window: float = 0.03  # [m] aligned within this, stepping
+    kick_lateral_window: float = 0.03  # [m]
+    kick_heading_window: float = 0.15  # [rad] the foot's direction makes up for the rest
+    kick_window_growth: float = 1.6  # windows grow to this times their size while lining up takes long
+    kick_patience: float = 10.0  # [s] of lining up that double the windows
+    kick_settle_growth: float = 1.9  # windows are this much wider once standing, so that it does not chatter
+    kick_wait_ahead: float = 0.47  # [m] distance kept from the ball until the robot is lined up sideways
+    kick_align_speed: float = 0.12  # [m/s] small steps next to the ball
+    kick_settle_time: float = 0.4  # [s] stand this long: the last step and the ball's estimate die down
+    kick_settle_limit: float = 2.5  # [s] stop waiting for motion control to report that it stands
+    kick_start_limit: float = 3.0  # [s] no kick has begun by then: it was refused
+    kick_run_limit: float = 8.0  # [s] a kick lasts about 3 s; longer means that its end was not reported
+    kick_speed: float = 3.0  # [m/s] of the foot
+    kick_direction_limit: float = 0.2  # [rad] farther sideways the foot cannot swing
+    kick_range: float = 3.5  # [m] ball to goal; farther, 5 deg of error miss the gap
+    kick_range_end: float = 4.0  # [m] keeps a begun alignment when the estimate jumps
+    kick_gap: float = 0.22  # [rad] free angle wanted: twice the kick's spread to each side
+    kick_gap_end: float = 0.15  # [rad]
+    kick_always_range: float = 1.3  # [m] so near that waiting for a wider gap would run into the keeper
+
+    # Aim.
+    opponent_radius: float = 0.30  # [m] keeper's half width and a step to the side
+    aim_time: float = 1.2  # [s] smoothing of the aim point: estimates of keeper and pose jitter
+    gap_preference: float = 1.25  # another gap has to be this much wider to change the side
+
+    # Ball lost and found.
+    ball_lost_age: float = 3.0  # [s] unseen: longer than a glance and the time a ball at the feet may be hidden
+    ball_found_age: float = 0.5  # [s] seen again
+    ball_confidence: float = 0.25  # below this it may be a false sighting
+    look_back_time: float = 1.5  # [s] look where it was
+    sweep_time: float = 7.0  # [s] one whole sweep of the head, far and near
+    search_turn_speed: float = 0.5  # [rad/s] slow enough for a picture every 2 deg
+    search_walk_time: float = 6.0  # [s] towards the field's middle after a whole turn without a ball
+
+    # Gaze.
+    glance_reach: float = 1.2  # [rad] farther to the side the head needs too long
+    glance_nearest: float = 0.8  # [m] nearer landmarks tell little
+    glance_farthest: float = 7.0  # [m] farther ones are too small
+    glance_period: float = 5.0  # [s] then the next landmark
+    glance_height: float = 0.2  # [m] above the ground: foot and middle of a post in one picture
+
+    # Game.
+    game_state_limit: float = 30.0  # [s] no referee packet for so long: stand; shorter gaps are lost packets
+    walk_to_ready: bool = False  # in dribble and kick the robot is placed by hand
+    ready_x: float = -1.5  # [m] in map
+    ready_y: float = 0.0  # [m] in map
+    ready_yaw: float = 0.0  # [rad] in map
+    place_tolerance: float = 0.15  # [m] of walking to a place
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not isinstance(value, float):
+                continue
+            if not math.isfinite(value):
+                raise ValueError(f"{field.name} is {value}; expected a finite number")
+            if field.name not in _SIGNED and value <= 0.0:
+                raise ValueError(f"{field.name} is {value}; expected > 0")
+        if self.arc_ahead >= 1.2:
+            raise ValueError(f"arc_ahead is {self.arc_ahead} rad; expected less than 1.2")
+        for less, more in (
+            ("behind_offset", "behind_offset_end"),
+            ("behind_cone", "behind_cone_end"),
+            ("behind_heading", "behind_heading_end"),
+            ("behind_reach", "behind_reach_end"),
+            ("behind_nearest", "kick_ahead"),
+            ("kick_ahead", "kick_wait_ahead"),
+            ("kick_wait_ahead", "standoff"),
+            ("ball_clearance", "standoff"),
+            ("standoff", "behind_reach"),
+            ("kick_range", "kick_range_end"),
+            ("kick_gap_end", "kick_gap"),
+            ("kick_window_growth", "kick_settle_growth"),
+            ("ball_found_age", "ball_lost_age"),
+        ):
+            if getattr(self, less) >= getattr(self, more):
+                raise ValueError(
+                    f"{less} is {getattr(self, less)}; expected less than {more}, which is {getattr(self, more)}"
+                )

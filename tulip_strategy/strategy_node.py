@@ -1,0 +1,116 @@
+"""Node "strategy": world, game, user and motion in; walk command, head command and kicks out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.action import ActionClient
+
+from tulip_description.field import FieldError, load_field
+from tulip_motion.interface import KickGoal
+from tulip_motion.messages import head_command_to_message, motion_state_from_message, walk_command_to_message
+from tulip_msgs.msg import GameState as GameStateMessage
+from tulip_msgs.msg import MotionState as MotionStateMessage
+from tulip_msgs.msg import UserCommand as UserCommandMessage
+from tulip_msgs.msg import WorldState as WorldStateMessage
+from tulip_ros import topics
+from tulip_ros.errors import BadInputError
+from tulip_ros.run import ComponentNode, run
+from tulip_strategy.interface import GameState, UserCommand, UserRequest
+from tulip_strategy.messages import (
+    decision_to_message,
+    game_state_from_message,
+    kick_goal_to_message,
+    user_command_from_message,
+    world_state_from_message,
+)
+from tulip_strategy.parameters import StrategyParameters
+from tulip_strategy.strategy import Strategy
+
+NEW_GAME = 1_000_000_000  # [ns] a stamp this far back belongs to a simulation begun anew
+
+
+@dataclass(frozen=True)
+class StrategyNodeParameters(StrategyParameters):
+    """Parameters of strategy and of its node."""
+
+    field_file: str = ""  # "" for the AdultSize field of 2013
+
+
+class StrategyNode(ComponentNode):
+    """Decides on each world state."""
+
+    def __init__(self) -> None:
+        """Make the core and connect it."""
+        super().__init__("strategy")
+        self._settings = self.load(StrategyNodeParameters())
+        try:
+            self._field = load_field(self._settings.field_file or None)
+        except FieldError as error:
+            raise BadInputError(f"Parameter field_file of node 'strategy': {error}") from error
+        self._strategy = Strategy(self._settings, self._field)
+        self._game: GameState | None = None
+        self._user = UserCommand(0, UserRequest.STOP)
+        self._motion: MotionStateMessage | None = None
+        self._last_stamp = 0
+        self._walk = self.sender(topics.WALK_COMMAND)
+        self._head = self.sender(topics.HEAD_COMMAND)
+        self._decision = self.sender(topics.DECISION)
+        self._kicks = ActionClient(self, topics.KICK.type, topics.KICK.name)
+        self.listen(topics.WORLD_STATE, self._on_world_state)
+        self.listen(topics.GAME_STATE, self._on_game_state)
+        self.listen(topics.USER_COMMAND, self._on_user_command)
+        self.listen(topics.MOTION_STATE, self._on_motion_state)
+
+    def _on_game_state(self, message: GameStateMessage) -> None:
+        self._game = game_state_from_message(message)
+
+    def _on_user_command(self, message: UserCommandMessage) -> None:
+        self._user = user_command_from_message(message)
+
+    def _on_motion_state(self, message: MotionStateMessage) -> None:
+        self._motion = message  # at 250 Hz; read when a decision needs it
+
+    def _on_world_state(self, message: WorldStateMessage) -> None:
+        world = world_state_from_message(message)
+        if world.stamp < self._last_stamp - NEW_GAME:
+            self.get_logger().info("time went back: strategy begins anew")
+            self._strategy, self._game = Strategy(self._settings, self._field), None
+        self._last_stamp = world.stamp
+        motion = None if self._motion is None else motion_state_from_message(self._motion)
+        decision = self._strategy.decide(world.stamp, world, self._game, self._user, motion)
+        self._walk.publish(walk_command_to_message(decision.walk))
+        self._head.publish(head_command_to_message(decision.head))
+        self._decision.publish(decision_to_message(decision))
+        if decision.kick is not None:
+            self._kick(decision.kick)
+
+    def _kick(self, goal: KickGoal) -> None:
+        """Send the goal; the kick's progress comes back in motion_state, a refusal in diagnostics."""
+        if not self._kicks.server_is_ready():
+            self.health.count("kicks without motion control", "no node serves the Kick action; is motion running?")
+            return
+        self._kicks.send_goal_async(kick_goal_to_message(goal)).add_done_callback(self._on_kick_answer)
+
+    def _on_kick_answer(self, future: Any) -> None:
+        answer = future.result()
+        if not answer.accepted:
+            self.health.count("refused kicks", "motion control refused a kick; motion_state tells its mode")
+            return
+        self.health.count("kicks")
+        answer.get_result_async().add_done_callback(self._on_kick_end)
+
+    def _on_kick_end(self, future: Any) -> None:
+        result = future.result().result
+        if not result.success:
+            self.health.count("failed kicks", f"kick failed: {result.reason}")
+
+
+def main() -> None:
+    """Run the node."""
+    run(StrategyNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+"""Node "user_input": services for people and tools in, the user's last wish out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from std_srvs.srv import Trigger
+
+from tulip_ros import topics
+from tulip_ros.errors import BadInputError
+from tulip_ros.run import ComponentNode, run
+from tulip_strategy.behaviour.tree import STRATEGIES
+from tulip_strategy.interface import UserRequest
+from tulip_strategy.messages import user_command_to_message
+from tulip_strategy.user_input import UserInput, UserInputParameters
+
+TRIGGERS = {
+    topics.Service("start", Trigger, "user_input", "obey the referee and play"): UserRequest.PLAY,
+    topics.Service("stop", Trigger, "user_input", "stop and stand, whatever the referee says"): UserRequest.STOP,
+    topics.Service("stand", Trigger, "user_input", "stand up straight"): UserRequest.STAND,
+    topics.Service("limp", Trigger, "user_input", "legs without stiffness"): UserRequest.LIMP,
+}
+"""Services without arguments, for the wishes that need none, and what each asks for."""
+
+
+class UserInputNode(ComponentNode):
+    """Takes wishes and publishes the one that holds."""
+
+    def __init__(self) -> None:
+        """Make the core, publish the first command, and serve.
+
+        Raises:
+            BadInputError: if the strategy to begin with is not known.
+        """
+        super().__init__("user_input")
+        try:
+            self._input = UserInput(self.load(UserInputParameters()), tuple(STRATEGIES))
+        except ValueError as error:
+            raise BadInputError(f"Parameters of node 'user_input': {error}") from error
+        self._command = self.sender(topics.USER_COMMAND)
+        self._publish()
+        self.create_service(topics.SET_USER_COMMAND.type, topics.SET_USER_COMMAND.name, self._on_wish)
+        for service, request in TRIGGERS.items():
+            self.create_service(service.type, service.name, self._trigger(request))
+
+    def _on_wish(self, request: Any, response: Any) -> Any:
+        forward, left, turning = (float(value) for value in request.velocity)
+        refusal = self._input.ask(
+            self._now(), request.request, request.strategy, (forward, left, turning), request.argument
+        )
+        return self._answer(refusal, response)
+
+    def _trigger(self, wish: UserRequest) -> Any:
+        return lambda _, response: self._answer(self._input.ask(self._now(), wish), response)
+
+    def _answer(self, refusal: str, response: Any) -> Any:
+        response.success = not refusal
+        response.message = refusal
+        if refusal:
+            self.health.count("refused wishes", f"refused: {refusal}")
+        else:
+            self.health.count("wishes")
+            self._publish()
+        return response
+
+    def _publish(self) -> None:
+        self._command.publish(user_command_to_message(self._input.command))
+
+    def _now(self) -> int:
+        """Return the time [ns]: a wish carries no stamp of its own."""
+        return int(self.get_clock().now().nanoseconds)
+
+
+def main() -> None:
+    """Run the node."""
+    run(UserInputNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""From a picture to features with two angles each."""

@@ -1,0 +1,187 @@
+"""The ball: an orange disk whose size fits its place on the ground.
+
+A sphere's outline is a circular cone of rays, in any lens: all its unit rays u fulfil u . m = 1 with
+m = c / cos(rho), c the direction of the centre and rho half the angle that the ball fills. So the fit is
+linear and free of the bias of a circle fitted to pixels.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tulip_vision.features import Feature, FeatureClass
+from tulip_vision.findings import Findings, Refusal
+from tulip_vision.segmentation import Colour, Segmentation, patches
+from tulip_vision.view import Array, View, angles
+
+MOST_CANDIDATES = 10
+"""The largest orange patches are looked at; a crowd in orange shirts must not cost time without bound."""
+
+
+@dataclass(frozen=True)
+class BallParameters:
+    """How a ball is told from other orange things.
+
+    Attributes:
+        radius: Of the ball [m].
+        least_area: Smallest orange patch looked at [px^2].
+        size_tolerance: Largest ratio, either way, between the seen radius and the one that fits the place.
+        size_slack: Difference of radius that is always allowed [px].
+        least_fill: Share of the disk that must be orange.
+        least_carpet: Share of the points just beside and below the ball that must be carpet or line.
+        farthest: Largest distance along the ground [m].
+    """
+
+    radius: float = 0.0935
+    least_area: float = 12.0  # [px^2] at 9 m the ball covers about 70 px^2
+    size_tolerance: float = 1.6  # a tilt error of 1 deg changes the fitting radius at 6 m by a tenth
+    size_slack: float = 1.5  # [px] blur and shading at the edge of a small ball
+    least_fill: float = 0.45  # half hidden behind a foot or a post is still a ball
+    least_carpet: float = 0.25
+    farthest: float = 10.0  # [m]
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            ValueError: if one is out of range.
+        """
+        for name in ("radius", "least_area", "farthest"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected > 0")
+        if self.size_tolerance <= 1.0:
+            raise ValueError(f"size_tolerance is {self.size_tolerance}; expected > 1")
+        if self.size_slack < 0.0:
+            raise ValueError(f"size_slack is {self.size_slack} px; expected >= 0 px")
+        for name in ("least_fill", "least_carpet"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected 0 to 1")
+
+
+def find_ball(segmentation: Segmentation, view: View, parameters: BallParameters) -> Findings:
+    """Return the most likely ball, if any, and the orange patches that are none."""
+    candidates: list[Feature] = []
+    refusals: list[Refusal] = []
+    for points, area in patches(segmentation.mask(Colour.ORANGE), parameters.least_area, MOST_CANDIDATES):
+        result = _examine(points, area, segmentation, view, parameters)
+        if isinstance(result, Feature):
+            candidates.append(result)
+        else:
+            u, v = points.mean(axis=0)
+            refusals.append(Refusal(FeatureClass.BALL, (float(u), float(v)), result))
+    candidates.sort(key=lambda feature: feature.confidence, reverse=True)
+    return Findings(tuple(candidates[:1]), tuple(refusals))
+
+
+def _examine(
+    points: NDArray[np.int32], area: float, segmentation: Segmentation, view: View, parameters: BallParameters
+) -> Feature | str:
+    """Return the ball that an orange patch is, or why it is none."""
+    width, height = view.lens.width, view.lens.height
+    lowest = points[np.argmax(points[:, 1])]
+    if segmentation.on_carpet[lowest[1], lowest[0]] == 0:
+        return "not on the carpet"
+    free = (points[:, 0] > 0) & (points[:, 0] < width - 1) & (points[:, 1] > 0) & (points[:, 1] < height - 1)
+    edge = points[free]
+    if len(edge) < 5:
+        return "cut by the picture's edge"
+    rays = view.directions_at(edge[:, 0], edge[:, 1])
+    pixel = view.angle_per_pixel(rays.mean(axis=0) / np.linalg.norm(rays.mean(axis=0)))
+    hull = edge[cv2.convexHull(np.ascontiguousarray(edge), returnPoints=False).reshape(-1)]
+    fit = _fit_cone(view.directions_at(hull[:, 0], hull[:, 1]), rays, pixel)
+    if fit is None:
+        return "no round outline"
+    centre, radius, residual, used = fit
+    radius += 0.5 * pixel
+    if residual > max(1.2 * pixel, 0.12 * radius):
+        return f"not round: edge off by {residual / pixel:.1f} px"
+
+    down = -float(centre[2])
+    above_centre = view.height - parameters.radius
+    if down <= 1e-3 or above_centre <= 0.0:
+        return "above the horizon"
+    slant = above_centre / down
+    if slant > parameters.farthest:
+        return f"{slant:.1f} m away"
+    if slant <= parameters.radius:
+        return "inside the camera"
+    fitting = math.asin(parameters.radius / slant)
+    slack = parameters.size_slack * pixel
+    if not fitting / parameters.size_tolerance - slack <= radius <= fitting * parameters.size_tolerance + slack:
+        return f"radius {radius / pixel:.0f} px, {fitting / pixel:.0f} px would fit the place"
+
+    fill = area / _visible_disk_area(view, centre, radius, pixel)
+    if fill < parameters.least_fill:
+        return f"only {fill:.0%} of the disk is orange"
+    around = _cone(centre, radius + max(0.35 * radius, 2.5 * pixel), 24)
+    around = around[around[:, 2] < centre[2] + 0.3 * radius]
+    classes, inside = view.sample(segmentation.classes, view.pixels_of_directions(around))
+    carpet = (classes & (Colour.GREEN | Colour.WHITE)) != 0
+    share = float(carpet[inside].mean()) if inside.any() else 1.0  # the picture ends at the ball: nothing to see
+    if share < parameters.least_carpet:
+        return f"only {share:.0%} carpet around it"
+
+    azimuth, elevation = angles(centre[None])
+    # A ball of which only part of the outline is seen is less sure in place: its fit extrapolates.
+    seen = used / max(2.0 * math.pi * radius / pixel, 1.0)
+    doubt = 1.0 if seen > 0.7 else 1.0 + 3.0 * (0.7 - seen)
+    spread_azimuth, spread_elevation = view.spreads(centre, doubt)
+    fits = math.exp(-((math.log(radius / fitting) / math.log(parameters.size_tolerance)) ** 2))
+    return Feature(
+        FeatureClass.BALL,
+        float(azimuth[0]),
+        float(elevation[0]),
+        spread_azimuth,
+        spread_elevation,
+        confidence=min(1.0, fill) * fits * (0.5 + 0.5 * share),
+        angular_radius=radius,
+    )
+
+
+def _fit_cone(start: Array, rays: Array, pixel: float) -> tuple[Array, float, float, int] | None:
+    """Fit a cone to an outline.
+
+    Args:
+        start: (m, 3) rays of the outline's hull, the first guess.
+        rays: (n, 3) rays of the outline.
+        pixel: Angle of one pixel [rad].
+
+    Returns:
+        Direction of the axis (3,), half the opening angle [rad], mean residual [rad], number of rays used.
+    """
+    kept = start
+    for _ in range(4):
+        if len(kept) < 4:
+            return None
+        solution, _, rank, _ = np.linalg.lstsq(kept, np.ones(len(kept)), rcond=None)
+        length = float(np.linalg.norm(solution))
+        if rank < 3 or length <= 1.0:
+            return None
+        axis, radius = solution / length, math.acos(1.0 / length)
+        residuals = np.abs(np.arccos(np.clip(rays @ axis, -1.0, 1.0)) - radius)
+        kept = rays[residuals <= max(1.5 * pixel, 2.5 * float(np.median(residuals)))]
+    return axis, radius, float(np.sqrt(np.mean(np.sort(residuals)[: max(len(kept), 1)] ** 2))), len(kept)
+
+
+def _cone(axis: Array, opening: float, count: int) -> Array:
+    """Return (count, 3) unit vectors at the angle `opening` [rad] around a unit vector (3,)."""
+    helper = np.array([0.0, 0.0, 1.0]) if abs(axis[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
+    right = np.cross(axis, helper)
+    right /= np.linalg.norm(right)
+    up = np.cross(right, axis)
+    turn = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)[:, None]
+    around: Array = math.cos(opening) * axis + math.sin(opening) * (np.cos(turn) * right + np.sin(turn) * up)
+    return around
+
+
+def _visible_disk_area(view: View, axis: Array, radius: float, pixel: float) -> float:
+    """Return the area of the ball's disk that lies inside the picture [px^2]."""
+    ring = np.concatenate([_cone(axis, radius * share, 16) for share in (0.25, 0.56, 0.75, 0.9)])
+    inside = view.inside(view.pixels_of_directions(ring), margin=-0.5)
+    share = max(float(inside.mean()), 0.05)
+    return math.pi * (radius / pixel) ** 2 * share

@@ -1,0 +1,233 @@
+"""Crossings of lines, L, T and X, and the penalty mark.
+
+Two pieces of line that meet at a right angle propose a place; what shape it has is then read from the picture
+itself, by looking for paint along its four arms and for carpet between them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tulip_vision.features import Feature, FeatureClass
+from tulip_vision.findings import Findings, Refusal
+from tulip_vision.lines import Lines
+from tulip_vision.segmentation import Colour, Segmentation, patches
+from tulip_vision.view import Array, Mask, View, angles
+
+ARMS = np.array([0.13, 0.17, 0.21, 0.25, 0.29, 0.33])
+"""[m] Where an arm is looked at: beyond the width of the other line, before the next line of the field begins."""
+LEAST_MARK_AREA = 8.0
+"""[px^2] at 4 m the penalty mark covers about 12."""
+MOST_MARK_CANDIDATES = 20
+"""The largest white patches are looked at."""
+
+
+@dataclass(frozen=True)
+class CrossingParameters:
+    """How crossings are found.
+
+    Attributes:
+        farthest: Largest distance along the ground [m].
+        square: Largest deviation from a right angle [rad].
+        extension: How far a piece of line may end before the crossing [m].
+        least_arm: Share of an arm's samples that must be paint, or carpet where there is no arm.
+        circle_radius: Of the centre circle [m].
+        mark_size: Length of the bars of the penalty mark [m].
+        mark_range: Largest distance of a penalty mark [m].
+    """
+
+    farthest: float = 6.5  # [m]
+    square: float = math.radians(16.0)
+    extension: float = 0.30
+    least_arm: float = 0.65
+    circle_radius: float = 0.75
+    mark_size: float = 0.10
+    mark_range: float = 4.0
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            ValueError: if one is out of range.
+        """
+        for name, value in vars(self).items():
+            if not value > 0.0:
+                raise ValueError(f"{name} is {value}; expected > 0")
+        if not 0.5 < self.least_arm <= 1.0:
+            raise ValueError(f"least_arm is {self.least_arm}; expected above 0.5 to 1, or paint and carpet overlap")
+
+
+@dataclass(frozen=True)
+class _Place:
+    point: Array  # (2,) on the ground [m]
+    first: Array  # (2,) unit direction of one line
+    second: Array  # (2,) of the other, or of the circle's tangent
+    centre: Array | None  # (2,) of the circle [m], where the second line is the circle
+
+    def arms(self) -> Array:
+        """Return (4, len(ARMS), 2) points along the four arms [m]."""
+        straight = [self.point + ARMS[:, None] * arm for arm in (self.first, -self.first)]
+        if self.centre is None:
+            return np.stack([*straight, *(self.point + ARMS[:, None] * arm for arm in (self.second, -self.second))])
+        offset = self.point - self.centre
+        radius = float(np.linalg.norm(offset))
+        start = math.atan2(float(offset[1]), float(offset[0]))
+        turns = [start + sign * ARMS / radius for sign in (1.0, -1.0)]
+        bent = [self.centre + radius * np.column_stack([np.cos(turn), np.sin(turn)]) for turn in turns]
+        return np.stack([*straight, *bent])
+
+
+def find_crossings(lines: Lines, segmentation: Segmentation, view: View, parameters: CrossingParameters) -> Findings:
+    """Return the crossings of the lines in the picture."""
+    places = _proposals(lines, view, parameters)
+    if not places:
+        return Findings()
+    whiteness = cv2.dilate(segmentation.whiteness, np.ones((3, 3), dtype=np.uint8))
+    taken: list[Array] = []
+    features: list[Feature] = []
+    refusals: list[Refusal] = []
+    for place in places:
+        if any(float(np.linalg.norm(place.point - other)) < 0.3 for other in taken):
+            continue
+        kind, confidence, reason = _shape(place, np.asarray(whiteness), segmentation, view, parameters)
+        if kind is None:
+            pixel = view.pixels_on_ground(place.point[None])[0]
+            if np.isfinite(pixel).all():
+                refusals.append(Refusal(FeatureClass.CROSSING_L, (float(pixel[0]), float(pixel[1])), reason))
+            continue
+        taken.append(place.point)
+        features.append(_feature(kind, place.point, confidence, view))
+    return Findings(tuple(features), tuple(refusals))
+
+
+def find_penalty_marks(
+    lines: Lines, segmentation: Segmentation, view: View, parameters: CrossingParameters
+) -> Findings:
+    """Return white spots on the carpet that have the penalty mark's size and stand alone."""
+    level = 0.5 * (_carpet_whiteness(segmentation) + 255.0 * min(1.0, 0.75 * segmentation.brightness))
+    below = view.sines < -view.height / math.hypot(view.height, parameters.mark_range)
+    mask = ((segmentation.whiteness > np.uint8(level)) & (segmentation.on_carpet != 0) & below).astype(np.uint8)
+    features: list[Feature] = []
+    refusals: list[Refusal] = []
+    rows, columns = mask.shape
+    for points, _ in patches(mask, LEAST_MARK_AREA, MOST_MARK_CANDIDATES):
+        if len(points) < 6 or points.min() <= 0 or points[:, 0].max() >= columns - 1 or points[:, 1].max() >= rows - 1:
+            continue
+        ground = view.ground(view.directions_at(points[:, 0], points[:, 1]))
+        centre = 0.5 * (ground.max(axis=0) + ground.min(axis=0))
+        extent = 2.0 * np.linalg.norm(ground - centre, axis=1).max()
+        if not 0.6 * parameters.mark_size <= extent <= 1.9 * parameters.mark_size:
+            continue
+        turn = np.linspace(0.0, 2.0 * math.pi, 16, endpoint=False)
+        ring = centre + 1.6 * parameters.mark_size * np.column_stack([np.cos(turn), np.sin(turn)])
+        classes, inside = view.sample(segmentation.classes, view.pixels_on_ground(ring))
+        carpet = float(((classes & Colour.GREEN) != 0)[inside].mean()) if inside.any() else 0.0
+        own = abs(centre[0]) < 0.35 and abs(centre[1]) < 0.3
+        if carpet < 0.9 or own or any(_distance(centre, piece.start, piece.end) < 0.15 for piece in lines.pieces):
+            u, v = points.mean(axis=0)
+            refusals.append(Refusal(FeatureClass.PENALTY_MARK, (float(u), float(v)), "does not stand alone"))
+            continue
+        features.append(_feature(FeatureClass.PENALTY_MARK, centre, 0.6, view))
+    return Findings(tuple(features), tuple(refusals))
+
+
+def _proposals(lines: Lines, view: View, parameters: CrossingParameters) -> list[_Place]:
+    places: list[_Place] = []
+    pieces = lines.pieces
+    if lines.circle is not None:
+        for piece in pieces:
+            along = piece.direction
+            offset = lines.circle.centre - piece.start
+            across = float(along[0] * offset[1] - along[1] * offset[0])
+            if abs(across) > 0.15:
+                continue
+            foot = piece.start + float(offset @ along) * along
+            for side in (-1.0, 1.0):
+                point = foot + side * parameters.circle_radius * along
+                before, after = float((point - piece.start) @ along), float((piece.end - point) @ along)
+                if min(before, after) > -parameters.extension:
+                    places.append(_Place(point, along, np.array([-along[1], along[0]]), lines.circle.centre))
+    for index, one in enumerate(pieces):
+        for other in pieces[index + 1 :]:
+            first, second = one.direction, other.direction
+            turn = float(first[0] * second[1] - first[1] * second[0])
+            if abs(turn) < math.cos(parameters.square):
+                continue
+            offset = other.start - one.start
+            along_first = float(offset[0] * second[1] - offset[1] * second[0]) / turn
+            point = one.start + along_first * first
+            along_second = float((point - other.start) @ second)
+            reach = parameters.extension
+            if not (-reach <= along_first <= one.length + reach and -reach <= along_second <= other.length + reach):
+                continue
+            if float(np.linalg.norm(point - view.position[:2])) <= parameters.farthest:
+                places.append(_Place(point, first, second, None))
+    return places
+
+
+def _shape(
+    place: _Place, whiteness: Mask, segmentation: Segmentation, view: View, parameters: CrossingParameters
+) -> tuple[FeatureClass | None, float, str]:
+    """Read the shape of a crossing from the picture: kind or None, confidence, reason of refusal."""
+    along = place.arms().reshape(-1, 2)
+    diagonals = [a * place.first + b * place.second for a in (1.0, -1.0) for b in (1.0, -1.0)]
+    between = np.concatenate([place.point + np.array([[0.14], [0.2]]) * diagonal for diagonal in diagonals])
+    carpet_values, carpet_inside = view.sample(segmentation.whiteness, view.pixels_on_ground(between))
+    classes, _ = view.sample(segmentation.classes, view.pixels_on_ground(between))
+    on_green = ((classes & Colour.GREEN) != 0) & carpet_inside
+    if np.count_nonzero(on_green) < 5:
+        return None, 0.0, "little carpet between the arms"
+    values, inside = view.sample(whiteness, view.pixels_on_ground(along))
+    arm_classes, _ = view.sample(segmentation.classes, view.pixels_on_ground(along))
+    carpet = float(np.median(carpet_values[on_green]))
+    samples = values.reshape(4, len(ARMS)).astype(np.float64)
+    seen = inside.reshape(4, len(ARMS))
+    medians = np.where(seen.all(axis=1), np.median(samples, axis=1), carpet)
+    paint = float(np.sort(medians)[-2])  # at least two arms are paint
+    if paint - carpet < 20.0:
+        return None, 0.0, "no contrast"
+    is_paint = (samples > 0.5 * (paint + carpet)) & seen
+    green = ((arm_classes & Colour.GREEN) != 0).reshape(4, len(ARMS)) & seen
+    is_carpet = ~is_paint & green | (samples < carpet + 0.35 * (paint - carpet)) & green
+    has = is_paint.mean(axis=1) >= parameters.least_arm
+    lacks = is_carpet.mean(axis=1) >= parameters.least_arm
+    if not (has | lacks).all():
+        return None, 0.0, "an arm is hidden or out of the picture"
+    return _kind_of(has, place.centre is not None)
+
+
+def _kind_of(has: NDArray[np.bool_], circle: bool) -> tuple[FeatureClass | None, float, str]:
+    count = int(has.sum())
+    if count == 4:
+        return FeatureClass.CROSSING_X, 0.9 if circle else 0.7, ""
+    if circle:
+        return None, 0.0, "the circle does not cross here"
+    if count == 3:
+        return FeatureClass.CROSSING_T, 0.85, ""
+    if count == 2 and has[:2].any() and has[2:].any():
+        return FeatureClass.CROSSING_L, 0.85, ""
+    return None, 0.0, f"{count} arms, no corner"
+
+
+def _feature(kind: FeatureClass, point: Array, confidence: float, view: View) -> Feature:
+    direction = np.array([point[0], point[1], 0.0]) - view.position
+    direction /= np.linalg.norm(direction)
+    azimuth, elevation = angles(direction[None])
+    spread_azimuth, spread_elevation = view.spreads(direction)
+    return Feature(kind, float(azimuth[0]), float(elevation[0]), spread_azimuth, spread_elevation, confidence)
+
+
+def _carpet_whiteness(segmentation: Segmentation) -> float:
+    sampled = segmentation.whiteness[::8, ::8][(segmentation.classes[::8, ::8] & Colour.GREEN) != 0]
+    return float(np.median(sampled)) if sampled.size else 0.0
+
+
+def _distance(point: Array, start: Array, end: Array) -> float:
+    along = end - start
+    share = float(np.clip((point - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0))
+    return float(np.linalg.norm(point - start - share * along))

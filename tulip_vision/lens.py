@@ -1,0 +1,228 @@
+"""The lens: from directions to pixels and back, distortion included.
+
+Pixel (u, v) = (0, 0) is the middle of the upper left pixel; u grows to the right, v downwards. Directions
+are in camera_optical_frame: x right, y down, z along the optical axis.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+PLUMB_BOB = "plumb_bob"
+"""Brown-Conrady: k1, k2, p1, p2, k3 (4, 5 or 8 numbers: 8 is ROS's rational_polynomial)."""
+FISHEYE = "equidistant"
+"""Kannala-Brandt: theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)."""
+COEFFICIENTS = {PLUMB_BOB: (4, 5, 8), FISHEYE: (4,)}
+
+MODEL_NAMES = {"rational_polynomial": PLUMB_BOB, "fisheye": FISHEYE}  # other names in use for the same two models
+
+EXACT = (cv2.TERM_CRITERIA_MAX_ITER + cv2.TERM_CRITERIA_EPS, 40, 1e-9)
+"""Stopping rule of the inverse. OpenCV's default, five rounds, errs up to 0.32 px at the picture's edge."""
+
+
+class Lens:
+    """A camera's lens and its picture.
+
+    Attributes:
+        width, height: Of the picture [px].
+        camera_matrix: (3, 3) fx, fy, cx, cy [px] in their usual places.
+        distortion: (n,) coefficients of the model.
+        model: "plumb_bob" or "equidistant".
+    """
+
+    def __init__(
+        self, width: int, height: int, camera_matrix: ArrayLike, distortion: ArrayLike, model: str = PLUMB_BOB
+    ) -> None:
+        """Make a lens.
+
+        Args:
+            width: Of the picture [px].
+            height: Of the picture [px].
+            camera_matrix: (3, 3) [px].
+            distortion: (n,) coefficients; n is 4, 5 or 8 for plumb_bob and 4 for equidistant.
+            model: "plumb_bob" (or "rational_polynomial") or "equidistant" (or "fisheye").
+
+        Raises:
+            ValueError: if a shape, a number or the model is not one of these.
+        """
+        model = MODEL_NAMES.get(model, model)
+        if model not in COEFFICIENTS:
+            raise ValueError(f"lens model is {model!r}; expected one of {', '.join((*COEFFICIENTS, *MODEL_NAMES))}")
+        if width < 1 or height < 1:
+            raise ValueError(f"picture is {width} x {height} px; expected at least 1 x 1")
+        matrix = np.array(camera_matrix, dtype=np.float64)
+        coefficients = np.array(distortion, dtype=np.float64).reshape(-1)
+        if matrix.shape != (3, 3) or not np.isfinite(matrix).all() or min(matrix[0, 0], matrix[1, 1]) <= 0.0:
+            raise ValueError(f"camera_matrix is {matrix.tolist()}; expected 3 x 3, finite, with fx, fy > 0 px")
+        if matrix[0, 1] != 0.0 or not np.array_equal(matrix[[1, 2, 2, 2], [0, 0, 1, 2]], [0.0, 0.0, 0.0, 1.0]):
+            raise ValueError(f"camera_matrix is {matrix.tolist()}; expected [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]")
+        if coefficients.size not in COEFFICIENTS[model] or not np.isfinite(coefficients).all():
+            expected = " or ".join(str(n) for n in COEFFICIENTS[model])
+            raise ValueError(f"distortion is {coefficients.tolist()}; expected {expected} finite numbers for {model}")
+        matrix.setflags(write=False)
+        coefficients.setflags(write=False)
+        self.width = int(width)
+        self.height = int(height)
+        self.camera_matrix = matrix
+        self.distortion = coefficients
+        self.model = model
+
+    @classmethod
+    def from_camera_info(cls, info: Mapping[str, Any]) -> Lens:
+        """Make a lens from the entries width, height, distortion_model, d (5,) and k (9,) of a CameraInfo.
+
+        Raises:
+            ValueError: if an entry is missing or not usable.
+        """
+        missing = [key for key in ("width", "height", "distortion_model", "d", "k") if key not in info]
+        if missing:
+            raise ValueError(f"camera info lacks {', '.join(missing)}; expected width, height, distortion_model, d, k")
+        k = np.asarray(info["k"], dtype=np.float64)
+        if k.size != 9:
+            raise ValueError(f"camera info's k has {k.size} numbers; expected 9 (0 means: not calibrated)")
+        return cls(int(info["width"]), int(info["height"]), k.reshape(3, 3), info["d"], str(info["distortion_model"]))
+
+    def to_camera_info(self) -> dict[str, Any]:
+        """Return what `from_camera_info` reads, with plain lists of floats."""
+        name = "rational_polynomial" if self.distortion.size == 8 else self.model
+        return {
+            "width": self.width,
+            "height": self.height,
+            "distortion_model": name,
+            "d": [float(value) for value in self.distortion],
+            "k": [float(value) for value in self.camera_matrix.reshape(-1)],
+        }
+
+    def project(self, points: ArrayLike) -> Array:
+        """Return where points appear in the picture, camera matrix times distorted (x / z, y / z).
+
+        Args:
+            points: (n, 3) points or directions in camera_optical_frame, any length.
+
+        Returns:
+            (n, 2) pixels; NaN for points that are not in front of the camera (z <= 0), and for those so far
+            outside the picture that the distortion folds back on itself.
+        """
+        directions = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        pixels = np.full((len(directions), 2), np.nan)
+        z = directions[:, 2]
+        visible = z > 1e-9
+        visible[visible] = (
+            np.hypot(directions[visible, 0], directions[visible, 1]) <= z[visible] * self._largest_tangent
+        )
+        if visible.any():
+            pixels[visible] = self._distort(directions[visible])
+        return pixels
+
+    def rays(self, pixels: ArrayLike) -> Array:
+        """Return the directions seen at pixels, the inverse of `project`.
+
+        Args:
+            pixels: (n, 2), inside the picture or close to it.
+
+        Returns:
+            (n, 3) unit vectors in camera_optical_frame.
+        """
+        points = np.ascontiguousarray(np.asarray(pixels, dtype=np.float64).reshape(-1, 1, 2))
+        if len(points) == 0:
+            return np.empty((0, 3))
+        if self.model == FISHEYE:
+            flat = cv2.fisheye.undistortPoints(points, self.camera_matrix, self.distortion, criteria=EXACT)
+        else:
+            flat = cv2.undistortPoints(points, self.camera_matrix, self.distortion, criteria=EXACT)
+        directions = np.concatenate([flat.reshape(-1, 2), np.ones((len(points), 1))], axis=1)
+        unit: Array = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        return unit
+
+    def ray_table(self) -> NDArray[np.float32]:
+        """Return the direction seen at each pixel, computed once.
+
+        Returns:
+            (height, width, 3) unit vectors in camera_optical_frame, read-only.
+        """
+        return self._ray_table
+
+    def horizon(self, rotation: ArrayLike, count: int = 33) -> Array:
+        """Return the points of the horizon that lie in the picture, from left to right.
+
+        Args:
+            rotation: (3, 3) rotation of camera_optical_frame in a level frame (z up), as in base_footprint.
+            count: Number of directions tried over the field of view, >= 2.
+
+        Returns:
+            (m, 2) pixels, m <= count; empty where the horizon is not in the picture.
+        """
+        level = np.asarray(rotation, dtype=np.float64).reshape(3, 3)
+        forward = level[:, 2]
+        middle = math.atan2(forward[1], forward[0])
+        azimuths = np.linspace(middle + math.pi / 2.0, middle - math.pi / 2.0, count + 2)[1:-1]
+        directions = np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros(count)], axis=1)
+        pixels = self.project(directions @ level)
+        with np.errstate(invalid="ignore"):
+            inside = (pixels >= -0.5).all(axis=1) & (pixels <= (self.width - 0.5, self.height - 0.5)).all(axis=1)
+        found: Array = pixels[inside]
+        return found
+
+    @property
+    def field_of_view(self) -> tuple[float, float]:
+        """Angles between the left and right, and the upper and lower edge, through the principal point [rad]."""
+        cx, cy = self.camera_matrix[0, 2], self.camera_matrix[1, 2]
+        right, bottom = self.width - 0.5, self.height - 0.5
+        left_ray, right_ray, upper_ray, lower_ray = self.rays([(-0.5, cy), (right, cy), (cx, -0.5), (cx, bottom)])
+        return (
+            math.acos(float(np.clip(left_ray @ right_ray, -1.0, 1.0))),
+            math.acos(float(np.clip(upper_ray @ lower_ray, -1.0, 1.0))),
+        )
+
+    @cached_property
+    def _ray_table(self) -> NDArray[np.float32]:
+        v, u = np.mgrid[0 : self.height, 0 : self.width]
+        table = self.rays(np.stack([u.ravel(), v.ravel()], axis=1)).astype(np.float32)
+        table = table.reshape(self.height, self.width, 3)
+        table.setflags(write=False)
+        return table
+
+    @cached_property
+    def _largest_tangent(self) -> float:
+        """Tangent of the angle to the optical axis up to which the distortion grows monotonically."""
+        angles = np.linspace(0.0, math.radians(88.0), 881)
+        if self.model == FISHEYE:
+            coefficients = np.array([1.0, *self.distortion])
+            radii = sum(k * angles ** (2 * power + 1) for power, k in enumerate(coefficients))
+        else:
+            squared = np.tan(angles) ** 2
+            k = np.zeros(8)
+            k[: self.distortion.size] = self.distortion
+            numerator = 1.0 + squared * (k[0] + squared * (k[1] + squared * k[4]))
+            denominator = 1.0 + squared * (k[5] + squared * (k[6] + squared * k[7]))
+            radii = np.tan(angles) * numerator / denominator
+        falling = np.flatnonzero(np.diff(radii) <= 0.0)
+        return math.tan(angles[falling[0] if falling.size else -1])
+
+    def _distort(self, directions: Array) -> Array:
+        points = np.ascontiguousarray(directions).reshape(-1, 1, 3)
+        still = np.zeros(3)
+        model = cv2.fisheye.projectPoints if self.model == FISHEYE else cv2.projectPoints
+        pixels, _ = model(points, still, still, self.camera_matrix, self.distortion)
+        return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+
+
+HEAD_CAMERA_FOCAL_LENGTH = 455.0
+"""[px] assumed: no source names TUlip's camera. With the distortion below, 640 x 480 px see about 78 by 59 deg."""
+HEAD_CAMERA_DISTORTION: Sequence[float] = (-0.24, 0.06, 0.0005, -0.0004, 0.0)
+"""Assumed: the barrel of a cheap wide-angle webcam lens; it pulls the picture's corners in by tens of pixels."""
+
+
+def head_camera_lens() -> Lens:
+    """Return the head camera's lens: 640 x 480 px, barrel distortion. All of it is assumed (see above)."""
+    matrix = np.array([[HEAD_CAMERA_FOCAL_LENGTH, 0.0, 321.5], [0.0, HEAD_CAMERA_FOCAL_LENGTH, 238.0], [0.0, 0.0, 1.0]])
+    return Lens(640, 480, matrix, HEAD_CAMERA_DISTORTION, PLUMB_BOB)

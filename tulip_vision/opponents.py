@@ -1,0 +1,261 @@
+"""Opponents: a marker in the other team's colour on a body that stands on the carpet.
+
+The ground point below is found by following the body down from the marker, in a fan of vertical cuts,
+until the carpet begins.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from math import nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tulip_vision.features import Feature, FeatureClass
+from tulip_vision.findings import Findings, Refusal
+from tulip_vision.segmentation import Colour, Segmentation, patches
+from tulip_vision.view import Array, View, angles, direction_of
+
+MARKERS = {"cyan": (Colour.CYAN, Colour.MAGENTA), "magenta": (Colour.MAGENTA, Colour.CYAN)}
+"""Own marker colour and the opponents', by the own team's colour."""
+
+MOST_CANDIDATES = 10
+"""The largest patches in the marker's colour are looked at."""
+
+CARPET = Colour.GREEN | Colour.WHITE
+
+
+@dataclass(frozen=True)
+class OpponentParameters:
+    """How an opponent is recognised.
+
+    Attributes:
+        team_colour: Of our own team: "cyan" or "magenta"; opponents wear the other.
+        least_area: Smallest marker patch looked at [px^2].
+        lowest_marker, highest_marker: Height of markers above the ground [m].
+        half_width: Of a body [m].
+        depth: From the near edge of the feet to the point below the body [m].
+        depth_spread: Standard deviation of that depth [m].
+        farthest: Largest distance along the ground [m].
+    """
+
+    team_colour: str = "magenta"
+    least_area: float = 10.0  # [px^2] at 9 m a marker of 0.18 m is 9 px wide
+    lowest_marker: float = 0.15
+    highest_marker: float = 1.4
+    half_width: float = 0.30
+    depth: float = 0.10
+    depth_spread: float = 0.07  # [m] feet of 0.2 m seen from any side
+    farthest: float = 11.0  # [m]
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            ValueError: if one is out of range.
+        """
+        if self.team_colour not in MARKERS:
+            raise ValueError(f"team_colour is {self.team_colour!r}; expected {' or '.join(MARKERS)}")
+        for name in ("least_area", "half_width", "farthest"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected > 0")
+        if not 0.0 <= self.lowest_marker < self.highest_marker:
+            raise ValueError(
+                f"markers from {self.lowest_marker} m to {self.highest_marker} m; expected 0 <= lowest < highest"
+            )
+        if self.depth < 0.0 or self.depth_spread < 0.0:
+            raise ValueError(f"depth is {self.depth} m, depth_spread {self.depth_spread} m; expected >= 0 m")
+
+
+@dataclass(frozen=True)
+class _Marker:
+    left: float  # [rad]
+    right: float
+    low: float
+    high: float
+    area: float  # [px^2]
+    pixel: tuple[float, float]
+
+    @property
+    def azimuth(self) -> float:
+        return 0.5 * (self.left + self.right)
+
+
+def find_opponents(segmentation: Segmentation, view: View, parameters: OpponentParameters) -> Findings:
+    """Return opponents: direction of the ground below each; elevation NaN where the feet are not in view."""
+    colour = MARKERS[parameters.team_colour][1]
+    found = patches(segmentation.mask(colour), parameters.least_area, MOST_CANDIDATES)
+    markers = [_marker(points, area, view) for points, area in found if _compact(points, area)]
+    opponents: list[Feature] = []
+    reach: list[float] = []  # [rad] half the angle that each opponent fills
+    refusals: list[Refusal] = []
+    for marker in markers:
+        if any(
+            _angle(marker.azimuth, opponent.azimuth) < angle for opponent, angle in zip(opponents, reach, strict=True)
+        ):
+            continue  # another marker of an opponent already found
+        result = _examine(marker, markers, segmentation, view, parameters)
+        if isinstance(result, str):
+            refusals.append(Refusal(FeatureClass.OPPONENT, marker.pixel, result))
+            continue
+        distance = 2.0 if math.isnan(result.elevation) else view.height / math.tan(-result.elevation)
+        opponents.append(result)
+        reach.append(1.2 * parameters.half_width / distance)
+    return Findings(tuple(opponents), tuple(refusals))
+
+
+def _compact(points: NDArray[np.int32], area: float) -> bool:
+    """Return whether a patch is a marker and not a thin border where two other colours blend."""
+    width, height = np.ptp(points, axis=0) + 1
+    return bool(min(width, height) >= 3 and area >= 0.4 * width * height)
+
+
+def _marker(points: NDArray[np.int32], area: float, view: View) -> _Marker:
+    azimuths, elevations = angles(view.directions_at(points[:, 0], points[:, 1]))
+    turned = (azimuths - azimuths[0] + math.pi) % (2.0 * math.pi) - math.pi + azimuths[0]
+    u, v = points.mean(axis=0)
+    return _Marker(
+        float(turned.max()), float(turned.min()), float(elevations.min()), float(elevations.max()), area, (float(u), float(v))
+    )
+
+
+def _examine(
+    marker: _Marker, markers: list[_Marker], segmentation: Segmentation, view: View, parameters: OpponentParameters
+) -> Feature | str:
+    pixel = view.angle_per_pixel(direction_of(marker.azimuth, marker.low))
+    width = marker.left - marker.right
+    # First look: the marker's own width and half of it on either side is enough to hit a foot or a leg.
+    low = _contact(marker, 1.0 * width + 2.0 * pixel, segmentation, view, pixel)
+    if low is None:
+        spread, _ = view.spreads(direction_of(marker.azimuth, marker.low), 3.0)
+        if view.inside(view.pixels_of_directions(direction_of(marker.azimuth, marker.low - 0.12)[None]))[0]:
+            return "no carpet below the marker"
+        if marker.area < 40.0 * parameters.least_area:
+            return "feet out of the picture and the marker small"
+        if marker.low + marker.high > 0.2:
+            return "feet out of the picture and the marker high up"
+        return Feature(FeatureClass.OPPONENT, marker.azimuth, nan, spread, nan, confidence=0.4)
+    if low > -1e-3 or view.height / math.tan(-low) > parameters.farthest:
+        return "stands beyond the carpet"
+    # Second look, with the width that a body has at this range.
+    distance = view.height / math.tan(-low)
+    again = _contact(marker, parameters.half_width / distance, segmentation, view, pixel)
+    low = low if again is None else again
+    distance = view.height / math.tan(-low)
+    marker_height = view.height + distance * math.tan(0.5 * (marker.low + marker.high))
+    if not parameters.lowest_marker <= marker_height <= parameters.highest_marker:
+        return f"marker {marker_height:.2f} m above the ground"
+    if _painted(marker, low, segmentation, view) > 0.25:
+        return "yellow or blue below the marker: a pole"
+    marker = _joined(marker, markers, 1.2 * parameters.half_width / distance)
+    azimuth = _middle(marker, low, distance, segmentation, view, parameters)
+    elevation = -math.atan2(view.height, distance + parameters.depth)
+    spread_azimuth, spread_elevation = view.spreads(direction_of(azimuth, elevation), 2.0)
+    across = 0.05 / distance  # [rad] arms and legs make the middle of a body uncertain by 5 cm
+    along = parameters.depth_spread * view.height / (view.height**2 + distance**2)
+    return Feature(
+        FeatureClass.OPPONENT,
+        azimuth,
+        elevation,
+        math.hypot(spread_azimuth, across),
+        math.hypot(spread_elevation, along),
+        confidence=min(1.0, 0.6 + 0.4 * marker.area / (20.0 * parameters.least_area)),
+    )
+
+
+def _joined(marker: _Marker, markers: list[_Marker], reach: float) -> _Marker:
+    """Return a marker together with the others of the same opponent: those within `reach` [rad] of it."""
+    same = [other for other in markers if _angle(other.azimuth, marker.azimuth) < reach]
+    return replace(
+        marker,
+        left=max(other.left for other in same),
+        right=min(other.right for other in same),
+        low=min(other.low for other in same),
+        high=max(other.high for other in same),
+    )
+
+
+def _fan(azimuths: Array, elevations: Array) -> Array:
+    """Return (len(elevations) * len(azimuths), 3) directions, row by row from the first elevation."""
+    el, az = np.meshgrid(elevations, azimuths, indexing="ij")
+    return np.stack([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)], axis=-1).reshape(-1, 3)
+
+
+def _contact(marker: _Marker, half: float, segmentation: Segmentation, view: View, pixel: float) -> float | None:
+    """Return the elevation at which the body's lowest point meets the carpet [rad]; None if it is not seen.
+
+    Args:
+        marker: Where to start.
+        half: Half the angle of the fan [rad].
+        segmentation: Of the picture.
+        view: Of the picture.
+        pixel: Angle of one pixel [rad].
+    """
+    azimuths = np.linspace(marker.azimuth - half, marker.azimuth + half, 15)
+    step = 2.0 * pixel
+    bottom = -math.radians(80.0)
+    elevations = np.arange(0.5 * (marker.low + marker.high), bottom, -step)[:240]
+    pixels = view.pixels_of_directions(_fan(azimuths, elevations))
+    classes, inside = view.sample(segmentation.classes, pixels)
+    shape = (len(elevations), len(azimuths))
+    on_carpet, _ = view.sample(segmentation.on_carpet, pixels)
+    carpet = (((classes & CARPET) != 0) & (on_carpet != 0)).reshape(shape)
+    seen = inside.reshape(shape)
+    # The carpet begins where three samples in a row are carpet; a single one is noise.
+    begins = carpet[:-2] & carpet[1:-1] & carpet[2:]
+    has = begins.any(axis=0)
+    first = begins.argmax(axis=0)
+    starts_on_body = ~carpet[0] & seen[0]
+    usable = has & starts_on_body
+    if np.count_nonzero(usable) < 2:
+        return None
+    # Cuts that leave the picture before they meet carpet would have been lower still: the feet are cut off.
+    if np.count_nonzero(starts_on_body & ~has & ~seen[-1]) > np.count_nonzero(usable):
+        return None
+    # A body hides carpet: above its foot the picture shows something else inside the carpet's outline.
+    painted = (classes & (Colour.ORANGE | Colour.YELLOW | Colour.BLUE)) != 0
+    hides = ~carpet & (on_carpet != 0).reshape(shape) & ~painted.reshape(shape)
+    hidden = np.array([np.count_nonzero(hides[: first[column], column]) for column in range(len(azimuths))])
+    standing = usable & (hidden >= 2)
+    if np.count_nonzero(standing) < 2:
+        return None
+    rows = np.sort(first[standing])
+    return float(elevations[rows[-2]]) + 0.25 * step  # the second lowest: one cut may follow a ball or a shadow
+
+
+def _painted(marker: _Marker, low: float, segmentation: Segmentation, view: View) -> float:
+    """Return the share of yellow and blue between the marker's middle and the foot."""
+    elevations = np.linspace(low, 0.5 * (marker.low + marker.high), 24)
+    azimuths = np.linspace(marker.right, marker.left, 5)
+    classes, inside = view.sample(segmentation.classes, view.pixels_of_directions(_fan(azimuths, elevations)))
+    return float(((classes & (Colour.YELLOW | Colour.BLUE)) != 0)[inside].mean()) if inside.any() else 0.0
+
+
+def _middle(
+    marker: _Marker, low: float, distance: float, segmentation: Segmentation, view: View, parameters: OpponentParameters
+) -> float:
+    """Return the azimuth of the body's middle: of what is not carpet between the feet and the carpet's far edge."""
+    half = 1.3 * parameters.half_width / distance
+    azimuths = np.linspace(marker.azimuth - half, marker.azimuth + half, 41)
+    elevations = np.linspace(low + 0.02 / distance, min(marker.high, low + 0.9 / distance), 12)
+    pixels = view.pixels_of_directions(_fan(azimuths, elevations))
+    classes, inside = view.sample(segmentation.classes, pixels)
+    on_carpet, _ = view.sample(segmentation.on_carpet, pixels)
+    shape = (len(elevations), len(azimuths))
+    other = Colour.ORANGE | Colour.YELLOW | Colour.BLUE
+    body = (((classes & (CARPET | other)) == 0) & inside & (on_carpet != 0)).reshape(shape)
+    complete = (inside & (on_carpet != 0)).reshape(shape).all(axis=1)
+    rows = complete & body.any(axis=1) & (body.mean(axis=1) < 0.8)
+    if np.count_nonzero(rows) < 2:
+        return marker.azimuth
+    left = np.array([azimuths[row].max() for row in body[rows]])
+    right = np.array([azimuths[row].min() for row in body[rows]])
+    middle = float(np.median(0.5 * (left + right)))
+    # Legs and marker agree on most bodies; where they do not, the truth is between them.
+    return 0.5 * (middle + marker.azimuth)
+
+
+def _angle(first: float, second: float) -> float:
+    return abs((first - second + math.pi) % (2.0 * math.pi) - math.pi)

@@ -1,0 +1,363 @@
+"""Colour classes of a picture, by a table over all colours, and the carpet's outline.
+
+The table has 32 x 32 x 32 cells, one for the five upper bits of blue, green and red; each cell holds one
+bit for each class it belongs to. Classes are boxes in hue, saturation and value. The bounds on value move
+with the brightness of the carpet in the picture, so a dark hall needs no other parameters.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import IntFlag
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tulip_vision.view import Array, Mask, View
+
+Picture = NDArray[np.uint8]
+
+
+class Colour(IntFlag):
+    """Bits of the colour classes. A pixel may belong to several."""
+
+    GREEN = 1
+    WHITE = 2
+    ORANGE = 4
+    YELLOW = 8
+    BLUE = 16
+    CYAN = 32
+    MAGENTA = 64
+    DARK = 128
+
+
+@dataclass(frozen=True)
+class ColourBox:
+    """A box of colours.
+
+    Attributes:
+        hue: Lower and upper bound [deg], 0 red, 120 green, 240 blue; lower > upper goes through 0.
+        saturation: Lower and upper bound, 0 to 1.
+        value: Lower and upper bound, 0 to 1, for a carpet of the reference brightness.
+    """
+
+    hue: tuple[float, float] = (0.0, 360.0)
+    saturation: tuple[float, float] = (0.0, 1.0)
+    value: tuple[float, float] = (0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        """Check the bounds.
+
+        Raises:
+            ValueError: if one is out of range, or a lower bound exceeds its upper bound.
+        """
+        if not all(0.0 <= bound <= 360.0 for bound in self.hue):
+            raise ValueError(f"hue is {self.hue} deg; expected two angles from 0 to 360 deg")
+        for name, bounds in (("saturation", self.saturation), ("value", self.value)):
+            if not 0.0 <= bounds[0] <= bounds[1] <= 1.0:
+                raise ValueError(f"{name} is {bounds}; expected lower <= upper, both from 0 to 1")
+
+
+def _boxes() -> dict[Colour, ColourBox]:
+    # Hues of the rules of 2013, widened to what the pictures of that time show under hall lights.
+    return {
+        Colour.GREEN: ColourBox((68.0, 170.0), (0.25, 1.0), (0.12, 1.0)),  # 68: yellowish carpets
+        Colour.WHITE: ColourBox((0.0, 360.0), (0.0, 0.28), (0.55, 1.0)),
+        Colour.ORANGE: ColourBox((350.0, 38.0), (0.52, 1.0), (0.28, 1.0)),
+        Colour.YELLOW: ColourBox((41.0, 66.0), (0.42, 1.0), (0.30, 1.0)),
+        Colour.BLUE: ColourBox((204.0, 250.0), (0.45, 1.0), (0.18, 1.0)),
+        Colour.CYAN: ColourBox((172.0, 203.0), (0.35, 1.0), (0.28, 1.0)),
+        Colour.MAGENTA: ColourBox((285.0, 346.0), (0.32, 1.0), (0.28, 1.0)),
+        Colour.DARK: ColourBox((0.0, 360.0), (0.0, 1.0), (0.0, 0.22)),
+    }
+
+
+@dataclass(frozen=True)
+class SegmentationParameters:
+    """Colour classes and how the carpet's outline is found.
+
+    Attributes:
+        boxes: The box of each colour class.
+        reference_brightness: Value of the carpet for which the boxes are given, 0 to 1.
+        brightness_step: Tables are made for brightnesses that differ by this factor.
+        outline_step: Distance between the columns and rows looked at for the carpet's outline [px].
+        outline_run: Fewest samples, one above the other, that make a run of carpet.
+        outline_gap: Longer gaps end a run; a green jacket beyond the floor is no carpet [samples].
+        farthest: Nothing on the ground is looked for beyond this range [m].
+    """
+
+    boxes: dict[Colour, ColourBox] = field(default_factory=_boxes)
+    reference_brightness: float = 0.50
+    brightness_step: float = 1.25
+    outline_step: int = 8
+    outline_run: int = 3
+    outline_gap: int = 1  # far lines and noise
+    farthest: float = 12.5  # [m] the diagonal of carpet 10.4 x 7.4 m is 12.8 m
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            ValueError: if a class has no box or a number is out of range.
+        """
+        missing = [colour.name for colour in Colour if colour not in self.boxes]
+        if missing:
+            raise ValueError(f"boxes lack {', '.join(map(str, missing))}; expected one for each colour class")
+        if not 0.0 < self.reference_brightness <= 1.0:
+            raise ValueError(f"reference_brightness is {self.reference_brightness}; expected above 0 to 1")
+        if self.brightness_step <= 1.0:
+            raise ValueError(f"brightness_step is {self.brightness_step}; expected > 1")
+        if self.outline_step < 2:
+            raise ValueError(f"outline_step is {self.outline_step} px; expected >= 2 px")
+        if self.outline_run < 1 or self.outline_gap < 0:
+            raise ValueError(f"outline_run is {self.outline_run}, outline_gap {self.outline_gap}; expected >= 1, >= 0")
+        if self.farthest <= 0.0:
+            raise ValueError(f"farthest is {self.farthest} m; expected > 0 m")
+
+
+@dataclass(frozen=True)
+class Segmentation:
+    """A picture divided into colour classes.
+
+    Attributes:
+        classes: (height, width) bits of `Colour`.
+        whiteness: (height, width) the smaller of red and blue, 0 to 255: low on carpet, high on lines.
+        on_carpet: (height, width) 255 inside the carpet's outline, else 0.
+        outline: (n, 2) the outline's upper edge, left to right [px]; empty if no carpet is seen.
+        brightness: Value of the carpet over the reference brightness; 1 if no carpet is seen.
+        carpet_share: Share of the pixels that are green, 0 to 1.
+    """
+
+    classes: Mask
+    whiteness: Mask
+    on_carpet: Mask
+    outline: Array
+    brightness: float
+    carpet_share: float
+
+    def mask(self, colours: Colour) -> Mask:
+        """Return (height, width) nonzero where a pixel belongs to one of the classes."""
+        found: Mask = np.bitwise_and(self.classes, np.uint8(int(colours)))
+        return found
+
+
+class Segmenter:
+    """Divides pictures into colour classes and finds the carpet in them."""
+
+    def __init__(self, parameters: SegmentationParameters) -> None:
+        """Make a segmenter; its colour tables are made when first needed."""
+        self._parameters = parameters
+        self._tables: dict[int, NDArray[np.uint8]] = {}
+
+    def table(self, brightness: float) -> NDArray[np.uint8]:
+        """Return the (32768,) colour table for a carpet of this brightness over the reference brightness."""
+        step = math.log(self._parameters.brightness_step)
+        level = int(np.clip(round(math.log(max(brightness, 1e-3)) / step), -8, 5))
+        if level not in self._tables:
+            self._tables[level] = self._make_table(math.exp(level * step))
+        return self._tables[level]
+
+    def segment(self, picture: Picture, view: View) -> Segmentation:
+        """Divide a picture, (height, width, 3) BGR, into colour classes and find the carpet's outline."""
+        brightness = self._brightness(picture)
+        packed = cv2.cvtColor(picture, cv2.COLOR_BGR2BGR555)  # two bytes a pixel, little-endian: 0rrrrrgg gggbbbbb
+        index = packed.view(np.uint16).reshape(picture.shape[:2])
+        classes: Mask = np.take(self.table(brightness), index)
+        whiteness: Mask = cv2.min(cv2.extractChannel(picture, 0), cv2.extractChannel(picture, 2))
+        outline = self._outline(classes, view)
+        on_carpet: Mask = np.zeros(classes.shape, dtype=np.uint8)
+        if len(outline):
+            corners = [[outline[-1, 0], classes.shape[0]], [outline[0, 0], classes.shape[0]]]
+            polygon = np.rint(np.concatenate([outline, corners])).astype(np.int32)
+            cv2.fillPoly(on_carpet, [polygon], 255)
+        share = float(np.count_nonzero(classes[::8, ::8] & Colour.GREEN)) / max(classes[::8, ::8].size, 1)
+        return Segmentation(classes, whiteness, on_carpet, outline, brightness, share)
+
+    def _make_table(self, brightness: float) -> NDArray[np.uint8]:
+        hue, saturation, value = self._cells
+        table = np.zeros(32 * 32 * 32, dtype=np.uint8)
+        for colour, box in self._parameters.boxes.items():
+            low, high = box.hue
+            in_hue = (hue >= low) & (hue <= high) if low <= high else (hue >= low) | (hue <= high)
+            # An upper bound of 1 stays: nothing is too bright; a lower bound never asks for more than 0.8.
+            least = min(box.value[0] * brightness, 0.8)
+            most = 1.0 if box.value[1] >= 1.0 else min(box.value[1] * brightness, 1.0)
+            fits = in_hue & (saturation >= box.saturation[0]) & (saturation <= box.saturation[1])
+            table[fits & (value >= least) & (value <= most)] |= int(colour)
+        return table
+
+    @cached_property
+    def _cells(self) -> tuple[Array, Array, Array]:
+        """Hue [deg], saturation and value of the middle of each cell, in the order of BGR555."""
+        index = np.arange(32 * 32 * 32)
+        red, green, blue = ((((index >> shift) & 31) + 0.5) / 32.0 for shift in (10, 5, 0))
+        value = np.maximum(np.maximum(red, green), blue)
+        chroma = value - np.minimum(np.minimum(red, green), blue)
+        safe = np.where(chroma > 0.0, chroma, 1.0)
+        hue = np.where(
+            value == red,
+            ((green - blue) / safe) % 6.0,
+            np.where(value == green, (blue - red) / safe + 2.0, (red - green) / safe + 4.0),
+        )
+        return hue * 60.0, chroma / value, value
+
+    def _brightness(self, picture: Picture) -> float:
+        """Return the carpet's value over the reference, from every eighth pixel; 1 if there is hardly any green."""
+        hsv = cv2.cvtColor(np.ascontiguousarray(picture[::8, ::8]), cv2.COLOR_BGR2HSV).reshape(-1, 3)
+        box = self._parameters.boxes[Colour.GREEN]
+        hue = hsv[:, 0].astype(np.float64) * 2.0  # OpenCV keeps hue / 2 in a byte
+        green = (hue >= box.hue[0]) & (hue <= box.hue[1]) & (hsv[:, 1] >= 255 * box.saturation[0]) & (hsv[:, 2] >= 20)
+        if np.count_nonzero(green) < 0.02 * len(hsv):
+            return 1.0
+        return float(np.median(hsv[green, 2])) / 255.0 / self._parameters.reference_brightness
+
+    def _outline(self, classes: Mask, view: View) -> Array:
+        """Return the carpet's upper edge: the hull of the tops of each column's lowest run of carpet.
+
+        The carpet is convex, a lens-free picture of it is convex too, and objects that stand on it only take
+        parts away: a run that ends below an object is too low, never too high. So the hull is taken where no lens bends it: on the plane z = 1 of the camera, turned
+        about its optical axis until the horizon is level.
+        """
+        parameters = self._parameters
+        step = parameters.outline_step
+        coarse = classes[step // 2 :: step, step // 2 :: step]
+        rows, columns = coarse.shape
+        filled = (coarse & (Colour.GREEN | Colour.WHITE | Colour.ORANGE)) != 0
+        u_grid, v_grid = np.meshgrid(
+            np.arange(columns) * step + step // 2, np.arange(rows) * step + step // 2
+        )
+        rays = view.lens.ray_table()[v_grid, u_grid].astype(np.float64)
+        down = rays @ view.rotation[2]
+        lowest = view.height / math.hypot(view.height, parameters.farthest)  # sine of the angle below the horizon
+        usable = _large_parts(filled & (down < -lowest))
+        row = _top_of_lowest_run(usable, parameters.outline_run, parameters.outline_gap)
+        column = np.flatnonzero(row < rows)
+        if len(column) < 3:
+            return np.empty((0, 2))
+        row = row[column]
+        # The edge lies in the step above the first green sample: find it pixel by pixel.
+        u = u_grid[0, column]
+        v = v_grid[row, column]
+        offsets = np.arange(step)
+        above = np.maximum(v[:, None] - offsets, 0)
+        still = np.logical_and.accumulate((classes[above, u[:, None]] & Colour.GREEN) != 0, axis=1)
+        v = np.maximum(v - np.maximum(still.sum(axis=1) - 1, 0), 0)
+
+        flat = _level_plane(view, view.lens.ray_table()[v, u].astype(np.float64))
+        hull = _upper_hull(flat)
+        if len(hull) < 2:
+            return np.empty((0, 2))
+        across = np.linspace(flat[:, 0].min(), flat[:, 0].max(), 41)
+        height = np.interp(across, flat[hull, 0], flat[hull, 1])
+        return _picture_edge(_from_level_plane(view, np.stack([across, height], axis=1)), view)
+
+
+def patches(mask: Mask, least_area: float, most: int) -> list[tuple[NDArray[np.int32], float]]:
+    """Return the connected patches of a mask, largest first, those inside the holes of others too.
+
+    Args:
+        mask: (height, width) nonzero inside the patches.
+        least_area: Smaller ones are left out [px^2].
+        most: Largest number of patches.
+
+    Returns:
+        For each patch its outer contour, (n, 2) u and v [px], and its area without regard to holes [px^2].
+    """
+    contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    found = []
+    for index, contour in enumerate(contours):
+        points: NDArray[np.int32] = contour.reshape(-1, 2)
+        if hierarchy.reshape(-1, 4)[index, 3] >= 0:
+            continue  # the edge of a hole
+        # The contour runs through the middles of the edge pixels: half a pixel is missing all around.
+        area = float(cv2.contourArea(contour)) + 0.5 * len(points) + 1.0
+        if area >= least_area:
+            found.append((points, area))
+    found.sort(key=lambda patch: patch[1], reverse=True)
+    return found[:most]
+
+
+def _large_parts(filled: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the largest connected part of a coarse mask and those that are not much smaller.
+
+    Lines and robots divide the carpet, but green things in the hall stand apart from it and are small.
+    """
+    count, labels, numbers, _ = cv2.connectedComponentsWithStats(filled.astype(np.uint8), connectivity=8)
+    if count < 2:
+        return filled
+    areas = numbers[:, cv2.CC_STAT_AREA].copy()
+    areas[0] = 0
+    large: NDArray[np.bool_] = (areas >= 0.2 * areas.max())[labels]
+    return large
+
+
+def _top_of_lowest_run(filled: NDArray[np.bool_], shortest: int, gap: int) -> NDArray[np.intp]:
+    """Return for each column of (rows, columns) the top row of its lowest run; `rows` where there is none."""
+    rows, columns = filled.shape
+    top = np.full(columns, rows)
+    length = np.zeros(columns, dtype=np.intp)
+    missing = np.zeros(columns, dtype=np.intp)
+    done = np.zeros(columns, dtype=np.bool_)
+    for row in range(rows - 1, -1, -1):
+        here = filled[row] & ~done
+        length += here
+        top = np.where(here, row, top)
+        missing = np.where(here, 0, missing + 1)
+        ended = ~done & (missing > gap) & (length > 0)
+        done |= ended & (length >= shortest)
+        length = np.where(ended & ~done, 0, length)
+    return np.where(length >= shortest, top, rows)
+
+
+def _roll(view: View) -> tuple[float, float]:
+    """Return the world's up direction in the picture plane: unit (right, down) components."""
+    right, down = float(view.rotation[2, 0]), float(view.rotation[2, 1])
+    norm = math.hypot(right, down)
+    return (0.0, -1.0) if norm < 1e-6 else (right / norm, down / norm)
+
+
+def _level_plane(view: View, rays: Array) -> Array:
+    """Return (n, 2): right and up on the plane z = 1, turned so that up is the world's up."""
+    x, y = rays[:, 0] / rays[:, 2], rays[:, 1] / rays[:, 2]
+    right, down = _roll(view)
+    return np.stack([-x * down + y * right, x * right + y * down], axis=1)
+
+
+def _from_level_plane(view: View, points: Array) -> Array:
+    right, down = _roll(view)
+    x = -points[:, 0] * down + points[:, 1] * right
+    y = points[:, 0] * right + points[:, 1] * down
+    return view.lens.project(np.stack([x, y, np.ones(len(points))], axis=1))
+
+
+def _upper_hull(points: Array) -> NDArray[np.intp]:
+    """Return the indices of the upper convex hull of (n, 2) points, left to right (Andrew's monotone chain)."""
+    order = np.lexsort((points[:, 1], points[:, 0]))
+    chain: list[int] = []
+    for index in order:
+        while len(chain) >= 2:
+            first, second = points[chain[-2]], points[chain[-1]]
+            edge, new = second - first, points[index] - first
+            if edge[0] * new[1] - edge[1] * new[0] < 0.0:
+                break
+            chain.pop()
+        chain.append(int(index))
+    return np.array(chain, dtype=np.intp)
+
+
+def _picture_edge(outline: Array, view: View) -> Array:
+    """Let the outline reach the picture's left and right edge if it comes within a sampling step of them."""
+    outline = outline[np.isfinite(outline).all(axis=1)]
+    if not len(outline):
+        return outline
+    near = 3.0 * 8.0  # [px] columns sampled, three steps
+    ends = []
+    if outline[0, 0] < near:
+        ends.append([[0.0, outline[0, 1]]])
+    ends.append(outline)
+    if outline[-1, 0] > view.lens.width - near:
+        ends.append([[view.lens.width - 1.0, outline[-1, 1]]])
+    return np.concatenate(ends)

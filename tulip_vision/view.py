@@ -1,0 +1,195 @@
+"""The geometry of one picture: pixels, directions and points on the ground.
+
+Directions and points are in base_footprint (x forward, y left, z up, the ground at z = 0).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tulip_vision.lens import Lens
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class SpreadParameters:
+    """How far a measured direction may be off.
+
+    Attributes:
+        pixel: Standard deviation of a well-defined edge or middle [px].
+        pose_azimuth: Of the camera pose's heading, from joint play and the time between picture and pose [rad].
+        pose_elevation: Of the camera pose's tilt, from the IMU and the same causes [rad].
+    """
+
+    pixel: float = 0.7  # [px] blur and colour borders; evaluation with rendered scenes gives 0.3 to 0.8
+    pose_azimuth: float = math.radians(0.3)  # [rad] encoder play of head and hips
+    pose_elevation: float = math.radians(0.5)  # [rad] IMU tilt of a walking robot, 0.4 deg, and the neck's play
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            ValueError: if one is negative or not finite.
+        """
+        for name, value in vars(self).items():
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} is {value}; expected a finite number >= 0")
+
+
+class View:
+    """What a camera with a known lens sees from a known place.
+
+    Attributes:
+        lens: The lens.
+        rotation: (3, 3) of camera_optical_frame in base_footprint.
+        position: (3,) the optical centre in base_footprint [m].
+        spread: How far directions may be off.
+    """
+
+    def __init__(self, lens: Lens, camera_in_footprint: Any, spread: SpreadParameters) -> None:
+        """Make the view.
+
+        Args:
+            lens: The lens.
+            camera_in_footprint: (4, 4) transform of camera_optical_frame in base_footprint.
+            spread: How far directions may be off.
+
+        Raises:
+            ValueError: if the transform is not a rigid one, or the camera is not above the ground.
+        """
+        transform = np.asarray(camera_in_footprint, dtype=np.float64)
+        if transform.shape != (4, 4) or not np.isfinite(transform).all():
+            raise ValueError(f"camera_in_footprint has shape {transform.shape}; expected (4, 4) finite numbers")
+        rotation = transform[:3, :3]
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0.0:
+            raise ValueError("camera_in_footprint holds no rotation; expected an orthonormal, right-handed 3 x 3 part")
+        if transform[2, 3] <= 0.0:
+            raise ValueError(f"camera is {transform[2, 3]:.3f} m high; expected > 0 m above the ground")
+        self.lens = lens
+        self.rotation = rotation
+        self.position = transform[:3, 3].copy()
+        self.spread = spread
+
+    @cached_property
+    def sines(self) -> NDArray[np.float32]:
+        """(height, width) sine of the elevation seen at each pixel; negative below the horizon."""
+        table = self.lens.ray_table()
+        seen: NDArray[np.float32] = table.reshape(-1, 3) @ self.rotation[2].astype(np.float32)
+        return seen.reshape(table.shape[:2])
+
+    @property
+    def height(self) -> float:
+        """Of the optical centre above the ground [m]."""
+        return float(self.position[2])
+
+    def directions(self, pixels: Array) -> Array:
+        """Return (n, 3) unit vectors in base_footprint that are seen at (n, 2) pixels."""
+        seen: Array = self.lens.rays(pixels) @ self.rotation.T
+        return seen
+
+    def directions_at(self, u: NDArray[np.integer[Any]], v: NDArray[np.integer[Any]]) -> Array:
+        """Return (n, 3) unit vectors seen at whole pixels inside the picture; much faster than `directions`."""
+        seen: Array = self.lens.ray_table()[v, u].astype(np.float64) @ self.rotation.T
+        return seen
+
+    def ground(self, directions: Array) -> Array:
+        """Return where directions meet the ground.
+
+        Args:
+            directions: (n, 3) in base_footprint.
+
+        Returns:
+            (n, 2) x, y in base_footprint [m]; NaN where the direction does not point below the horizon.
+        """
+        down = directions[:, 2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            reach = np.where(down < -1e-6, -self.height / down, np.nan)
+        met: Array = self.position[:2] + directions[:, :2] * reach[:, None]
+        return met
+
+    def pixels(self, points: Array) -> Array:
+        """Return (n, 2) pixels of (n, 3) points in base_footprint; NaN for points that are not in front."""
+        return self.lens.project((np.asarray(points, dtype=np.float64) - self.position) @ self.rotation)
+
+    def pixels_of_directions(self, directions: Array) -> Array:
+        """Return (n, 2) pixels at which (n, 3) directions in base_footprint are seen; NaN behind the camera."""
+        return self.lens.project(np.asarray(directions, dtype=np.float64) @ self.rotation)
+
+    def pixels_on_ground(self, points: Array) -> Array:
+        """Return (n, 2) pixels of (n, 2) points on the ground, x and y in base_footprint [m]."""
+        flat = np.asarray(points, dtype=np.float64)
+        return self.pixels(np.concatenate([flat, np.zeros((len(flat), 1))], axis=1))
+
+    def angle_per_pixel(self, direction: Array) -> float:
+        """Return how much one pixel sees around a direction (3,) in base_footprint [rad]."""
+        side = np.cross(direction, self.rotation[:, 2])
+        norm = float(np.linalg.norm(side))
+        side = self.rotation[:, 0] if norm < 1e-6 else side / norm
+        step = 1e-3  # [rad] small enough to be linear, large enough for the projection's rounding
+        ends = self.pixels_of_directions(np.stack([direction, direction + step * side]))
+        moved = float(np.linalg.norm(ends[1] - ends[0]))
+        return step / moved if moved > 0.0 else 1.0 / float(self.lens.camera_matrix[0, 0])
+
+    def spreads(self, direction: Array, pixels: float = 1.0) -> tuple[float, float]:
+        """Return the standard deviations of azimuth and elevation of a direction [rad].
+
+        Pixel noise and pose error are independent, so their variances add. Close to the vertical an angle
+        across the ray becomes a larger azimuth.
+
+        Args:
+            direction: (3,) unit vector in base_footprint.
+            pixels: How many times `SpreadParameters.pixel` the measured place is off.
+        """
+        noise = self.spread.pixel * pixels * self.angle_per_pixel(direction)
+        level = max(math.hypot(float(direction[0]), float(direction[1])), 0.05)
+        return math.hypot(noise / level, self.spread.pose_azimuth), math.hypot(noise, self.spread.pose_elevation)
+
+    def inside(self, pixels: Array, margin: float = 0.0) -> NDArray[np.bool_]:
+        """Return (n,) whether (n, 2) pixels lie in the picture, `margin` pixels from its edges."""
+        with np.errstate(invalid="ignore"):
+            found: NDArray[np.bool_] = (
+                (pixels[:, 0] >= margin)
+                & (pixels[:, 1] >= margin)
+                & (pixels[:, 0] <= self.lens.width - 1 - margin)
+                & (pixels[:, 1] <= self.lens.height - 1 - margin)
+            )
+        return found
+
+    def sample(self, image: NDArray[Any], pixels: Array) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """Read an image at (n, 2) pixels.
+
+        Returns:
+            (n,) values, those outside the picture read as 0, and (n,) whether each is inside.
+        """
+        inside = self.inside(pixels)
+        nearest = np.where(inside[:, None], np.rint(np.nan_to_num(pixels)), 0).astype(np.intp)
+        values = image[nearest[:, 1], nearest[:, 0]]
+        return np.where(inside, values, 0), inside
+
+    def coverage(self) -> Array:
+        """Return (4,) azimuth of left and right edge, elevation of lower and upper edge, at the middle [rad]."""
+        right, bottom = self.lens.width - 1.0, self.lens.height - 1.0
+        edges = self.directions(
+            np.array([[0.0, bottom / 2], [right, bottom / 2], [right / 2, bottom], [right / 2, 0.0]])
+        )
+        azimuths, elevations = angles(edges)
+        return np.array([azimuths[0], azimuths[1], elevations[2], elevations[3]])
+
+
+def angles(directions: Array) -> tuple[Array, Array]:
+    """Return azimuth and elevation (n,) of (n, 3) unit vectors [rad]."""
+    return np.arctan2(directions[:, 1], directions[:, 0]), np.arcsin(np.clip(directions[:, 2], -1.0, 1.0))
+
+
+def direction_of(azimuth: float, elevation: float) -> Array:
+    """Return the (3,) unit vector with these angles [rad]."""
+    level = math.cos(elevation)
+    return np.array([level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)])

@@ -1,0 +1,1 @@
+"""Where the robot, the ball and the opponents are."""

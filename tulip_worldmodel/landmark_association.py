@@ -1,0 +1,208 @@
+"""Which landmark each feature of one picture shows, decided for the whole picture together.
+
+Features are taken one after the other, those with the fewest candidates first. Each hypothesis is a choice for
+the features so far (a landmark, or "false"), with the state as it would be after them, so that a later
+feature is judged by the joint likelihood. The cost of a choice is -2 ln of its likelihood:
+
+    landmark:  d^2 + ln det(2 pi S) - 2 ln(1 - p_false)      d: Mahalanobis distance of the innovation
+    false:     -2 ln(p_false * clutter density)
+
+Only the best few hypotheses are kept. A choice counts only if every hypothesis with another choice for that
+feature is clearly worse.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tulip_vision.features import Feature
+from tulip_worldmodel.mahalanobis import gate
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+FALSE = -1
+WIDTH = 12  # hypotheses kept; the true one is among the first two or three in practice
+
+
+class Observation(Protocol):
+    """A feature with its candidates, numbered from 0."""
+
+    feature: Feature
+
+    def key(self, candidate: int) -> object:
+        """Return the identity of what only one feature of a picture can show, or None."""
+
+    def possible(self, state: Array) -> Indices:
+        """Return the candidates that are possible at all near a state."""
+
+    def linearize(self, state: Array, candidates: Indices) -> tuple[Array, Array, Array]:
+        """Return innovations (k, m), Jacobians (k, m, n) and noise (k, m, m)."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was decided for one feature.
+
+    Attributes:
+        observation: Index of the observation.
+        candidate: The chosen candidate, or None when the feature is rejected.
+        reason: Why it was rejected, or "".
+    """
+
+    observation: int
+    candidate: int | None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class _Linearized:
+    observation: int
+    candidates: tuple[int, ...]
+    keys: tuple[object, ...]
+    innovations: Array
+    jacobians: Array
+    noises: Array
+    cost_true: float
+    cost_false: float
+
+
+@dataclass(frozen=True)
+class _Hypothesis:
+    cost: float
+    state: Array
+    covariance: Array
+    choices: tuple[int, ...]
+    taken: frozenset[object]
+
+
+def associate(
+    state: Array,
+    covariance: Array,
+    observations: Sequence[Observation],
+    false_rates: Sequence[float],
+    clutter: Sequence[float],
+    gate_probability: float,
+    odds: float,
+) -> tuple[Choice, ...]:
+    """Decide for each observation which candidate it shows.
+
+    Args:
+        state: (n,) prior state.
+        covariance: (n, n) its covariance.
+        observations: Of one picture.
+        false_rates: For each, the probability that it shows nothing that is a candidate.
+        clutter: For each, the density of false ones in its measurement space.
+        gate_probability: Share of true observations that the chi-square gate lets pass.
+        odds: How much more likely than any other choice the best one must be.
+
+    Returns:
+        One choice per observation, in their order.
+    """
+    rejected: dict[int, str] = {}
+    usable: list[_Linearized] = []
+    for index, observation in enumerate(observations):
+        near = _inside_gate(state, covariance, observation, gate_probability)
+        if near is None:
+            rejected[index] = "no landmark inside the gate"
+            continue
+        candidates, innovations, jacobians, noises = near
+        usable.append(
+            _Linearized(
+                index,
+                tuple(candidates),
+                tuple(observation.key(candidate) for candidate in candidates),
+                innovations,
+                jacobians,
+                noises,
+                innovations.shape[1] * math.log(2.0 * math.pi) - 2.0 * math.log(1.0 - false_rates[index]),
+                -2.0 * math.log(false_rates[index] * clutter[index]),
+            )
+        )
+    usable.sort(key=lambda item: (len(item.candidates), float(np.trace(item.noises[0]))))
+    gap = 2.0 * math.log(odds)
+    gates = {rows: gate(gate_probability, rows) for rows in (1, 2)}
+    hypotheses = [_Hypothesis(0.0, np.zeros_like(state), covariance, (), frozenset())]
+    for item in usable:
+        grown = [child for parent in hypotheses for child in _children(parent, item, gates)]
+        grown.sort(key=lambda hypothesis: hypothesis.cost)
+        limit = grown[0].cost + 2.0 * gap  # later features may turn the order, not by more than this in practice
+        hypotheses = [child for child in grown[:WIDTH] if child.cost <= limit]
+    return _verdicts(len(observations), usable, hypotheses, rejected, gap)
+
+
+def _inside_gate(
+    state: Array, covariance: Array, observation: Observation, probability: float
+) -> tuple[list[int], Array, Array, Array] | None:
+    possible = observation.possible(state)
+    if not len(possible):
+        return None
+    innovations, jacobians, noises = observation.linearize(state, possible)
+    spread = jacobians @ covariance @ jacobians.transpose(0, 2, 1) + noises
+    distances = np.einsum("km,km->k", innovations, np.linalg.solve(spread, innovations[:, :, None])[:, :, 0])
+    near = np.flatnonzero(distances <= gate(probability, innovations.shape[1]))
+    if not len(near):
+        return None
+    return [int(candidate) for candidate in possible[near]], innovations[near], jacobians[near], noises[near]
+
+
+def _children(parent: _Hypothesis, item: _Linearized, gates: dict[int, float]) -> list[_Hypothesis]:
+    """Continue one hypothesis with every choice for one feature; states are offsets from the prior."""
+    children = [
+        _Hypothesis(
+            parent.cost + item.cost_false,
+            parent.state,
+            parent.covariance,
+            (*parent.choices, FALSE),
+            parent.taken,
+        )
+    ]
+    for position, candidate in enumerate(item.candidates):
+        key = item.keys[position]
+        if key is not None and key in parent.taken:
+            continue
+        jacobian = item.jacobians[position]
+        innovation = item.innovations[position] - jacobian @ parent.state
+        gain_part = parent.covariance @ jacobian.T
+        spread = jacobian @ gain_part + item.noises[position]
+        inverse = np.linalg.inv(spread)
+        distance = float(innovation @ inverse @ innovation)
+        if distance > gates[len(innovation)]:
+            continue
+        gain = gain_part @ inverse
+        children.append(
+            _Hypothesis(
+                parent.cost + distance + math.log(float(np.linalg.det(spread))) + item.cost_true,
+                parent.state + gain @ innovation,
+                parent.covariance - gain @ gain_part.T,
+                (*parent.choices, candidate),
+                parent.taken if key is None else parent.taken | {key},
+            )
+        )
+    return children
+
+
+def _verdicts(
+    count: int, usable: list[_Linearized], hypotheses: list[_Hypothesis], rejected: dict[int, str], gap: float
+) -> tuple[Choice, ...]:
+    best = hypotheses[0]
+    chosen: dict[int, int] = {}
+    for position, item in enumerate(usable):
+        choice = best.choices[position]
+        others = [other.cost for other in hypotheses[1:] if other.choices[position] != choice]
+        if choice == FALSE:
+            rejected[item.observation] = "more likely false than any landmark inside the gate"
+        elif others and min(others) - best.cost < gap:
+            rejected[item.observation] = "ambiguous: another explanation is about as likely"
+        else:
+            chosen[item.observation] = choice
+    return tuple(
+        Choice(index, chosen[index]) if index in chosen else Choice(index, None, rejected[index])
+        for index in range(count)
+    )

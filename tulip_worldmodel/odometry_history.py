@@ -1,0 +1,134 @@
+"""The recent path in odom, so that a picture can be used at the moment when it was taken."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections import deque
+from dataclasses import dataclass
+
+from tulip_description.planar import Pose2D, wrap_angle
+from tulip_motion.interface import Odometry
+
+TURN_PORTION = 0.1
+"""[rad] Turning is counted when it has grown to this: the trunk's swinging at each step is no turning."""
+PATH_PORTION = 0.15
+"""[m] Likewise for the path: the trunk sways to both sides at each step."""
+
+
+@dataclass(frozen=True)
+class PathPoint:
+    """Where dead reckoning had the robot at one moment.
+
+    Attributes:
+        stamp: [ns].
+        pose: base_footprint in odom.
+        distance: Path length since the start [m], in portions of `PATH_PORTION`.
+        turned: Sum of all turning, left and right, since the start [rad], in portions of `TURN_PORTION`.
+    """
+
+    stamp: int
+    pose: Pose2D
+    distance: float = 0.0
+    turned: float = 0.0
+
+
+@dataclass(frozen=True)
+class Increment:
+    """Movement between two moments, in base_footprint of the first.
+
+    Attributes:
+        pose: The later base_footprint in the earlier one.
+        distance: Path length between them [m].
+        turned: Turning between them [rad], >= 0.
+        duration: [s].
+    """
+
+    pose: Pose2D
+    distance: float
+    turned: float
+    duration: float
+
+
+def footprint(odometry: Odometry) -> Pose2D:
+    """Return base_footprint in odom: base_link on the ground with its yaw alone."""
+    x, y, z, w = (float(value) for value in odometry.orientation)
+    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return Pose2D(float(odometry.position[0]), float(odometry.position[1]), yaw)
+
+
+def increment(earlier: PathPoint, later: PathPoint) -> Increment:
+    """Return the movement from one moment to another."""
+    return Increment(
+        earlier.pose.inverse() @ later.pose,
+        max(0.0, later.distance - earlier.distance),
+        max(0.0, later.turned - earlier.turned),
+        (later.stamp - earlier.stamp) * 1e-9,
+    )
+
+
+class OdometryHistory:
+    """Path points of the last seconds; older ones are forgotten."""
+
+    def __init__(self, duration: float) -> None:
+        """Start empty.
+
+        Args:
+            duration: How far back to remember [s].
+        """
+        self._duration = round(duration * 1e9)  # [ns]
+        self._points: deque[PathPoint] = deque()
+        self._counted = Pose2D()  # pose up to which `distance` and `turned` were counted
+
+    def append(self, odometry: Odometry) -> bool:
+        """Add a reading; False, and no change, if it is not newer than the newest one."""
+        pose = footprint(odometry)
+        distance = turned = 0.0
+        if not self._points:
+            self._counted = pose
+        else:
+            last = self._points[-1]
+            if odometry.stamp <= last.stamp:
+                return False
+            distance, turned = last.distance, last.turned
+            path = math.hypot(pose.x - self._counted.x, pose.y - self._counted.y)
+            if path >= PATH_PORTION:
+                distance += path
+                self._counted = Pose2D(pose.x, pose.y, self._counted.yaw)
+            turn = abs(wrap_angle(pose.yaw - self._counted.yaw))
+            if turn >= TURN_PORTION:
+                turned += turn
+                self._counted = Pose2D(self._counted.x, self._counted.y, pose.yaw)
+        self._points.append(PathPoint(odometry.stamp, pose, distance, turned))
+        while len(self._points) > 2 and self._points[1].stamp < odometry.stamp - self._duration:
+            self._points.popleft()
+        return True
+
+    @property
+    def newest(self) -> PathPoint | None:
+        """The newest point, or None before the first reading."""
+        return self._points[-1] if self._points else None
+
+    def at(self, stamp: int) -> PathPoint:
+        """Return the path at a stamp, interpolated; the first or last point outside the remembered time.
+
+        Raises:
+            LookupError: before the first reading.
+        """
+        if not self._points:
+            raise LookupError("no odometry yet; expected at least one reading before the path is asked for")
+        index = bisect_right(self._points, stamp, key=lambda point: point.stamp)
+        if index == 0:
+            return self._points[0]
+        if index == len(self._points):
+            return self._points[-1]
+        before, after = self._points[index - 1], self._points[index]
+        part = (stamp - before.stamp) / (after.stamp - before.stamp)
+        pose = Pose2D(
+            before.pose.x + part * (after.pose.x - before.pose.x),
+            before.pose.y + part * (after.pose.y - before.pose.y),
+            wrap_angle(before.pose.yaw + part * wrap_angle(after.pose.yaw - before.pose.yaw)),
+        )
+        distance = before.distance + part * (after.distance - before.distance)
+        turned = before.turned + part * (after.turned - before.turned)
+        return PathPoint(stamp, pose, distance, turned)

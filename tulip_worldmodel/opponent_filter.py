@@ -1,0 +1,193 @@
+"""Where the opponents are: an extended Kalman filter in odom for each."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tulip_description.planar import wrap_angle
+from tulip_vision.features import FeatureClass, Features
+from tulip_worldmodel.association import assign
+from tulip_worldmodel.mahalanobis import gate
+from tulip_worldmodel.moving_point import MovingPoint
+from tulip_worldmodel.odometry_history import Increment
+from tulip_worldmodel.rejected import Rejected
+from tulip_worldmodel.sighting import Observer, Sighting, in_view
+
+Array = NDArray[np.float64]
+
+GROUND = 0.0  # [m] a sighting shows the point on the ground below the opponent
+
+
+@dataclass(frozen=True)
+class OpponentParameters:
+    """Parameters of the opponents' filters. Noise grows with the root of what it is given for."""
+
+    velocity_time: float = 1.0  # [s] in which a walking robot's velocity is forgotten: it stops and turns
+    velocity_noise: float = 0.3  # [m/s/sqrt(s)] walking robots change speed by about that in a second
+    position_noise_per_second: float = 0.05  # [m/sqrt(s)] the point below a robot is not well defined
+    position_noise_per_metre: float = 0.10  # [m/sqrt(m)] dead reckoning of the walking robot
+    position_noise_per_radian: float = 0.06  # [rad/sqrt(rad)] times range: dead reckoning of the turning robot
+    extra_azimuth_spread: float = math.radians(1.0)  # [rad] a body is wide
+    extra_elevation_spread: float = math.radians(1.0)  # [rad] feet differ from the middle of the body
+    start_speed_spread: float = 0.3  # [m/s]
+    longest_range: float = 8.0  # [m] not born further away
+    body_radius: float = 0.3  # [m] two nearer than this are one; what lies behind is hidden
+    most: int = 4  # opponents tracked at once
+    gate_probability: float = 0.999  # share of true sightings inside the chi-square gate
+    confidence_gain: float = 0.3  # share of the missing confidence that a sighting adds
+    confirmed: float = 0.6  # confidence of a confirmed opponent: reached with the third sighting
+    forgotten: float = 0.05  # confidence at which it is given up
+    missed_time: float = 1.0  # [s] in which confidence falls by e while it should be visible but is not
+    hidden_time: float = 15.0  # [s] in which confidence falls by e while nobody looks
+    visible_range: float = 5.0  # [m] up to which vision is expected to find it
+    view_margin: float = math.radians(5.0)  # [rad] from the picture's edge, where it may be cut
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            ValueError: if one is out of range.
+        """
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"{entry.name} is {value}; expected a finite value > 0")
+        for name in ("gate_probability", "confidence_gain", "confirmed", "forgotten"):
+            if getattr(self, name) >= 1.0:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected < 1")
+
+
+class Opponent:
+    """One opponent, perhaps not yet confirmed."""
+
+    def __init__(self, parameters: OpponentParameters, sighting: Sighting) -> None:
+        """Begin where a sighting with range shows it."""
+        position, covariance = sighting.position()
+        self.point = MovingPoint(position, covariance, np.zeros(2), np.eye(2) * parameters.start_speed_spread**2)
+        self._parameters = parameters
+        self.confirmed = False
+        self.confidence = 0.0
+        self.last_seen = 0  # stamp [ns]
+        self.gain_confidence(sighting)
+
+    def gain_confidence(self, sighting: Sighting) -> None:
+        """Count a sighting."""
+        self.confidence += self._parameters.confidence_gain * (1.0 - self.confidence)
+        self.confirmed = self.confirmed or self.confidence >= self._parameters.confirmed
+        self.last_seen = sighting.observer.stamp
+
+
+class OpponentFilter:
+    """All opponents."""
+
+    def __init__(self, parameters: OpponentParameters) -> None:
+        """Begin without opponents."""
+        self._parameters = parameters
+        self._opponents: list[Opponent] = []
+
+    @property
+    def confirmed(self) -> tuple[Opponent, ...]:
+        """Opponents that were seen often enough, in the order of their birth."""
+        return tuple(opponent for opponent in self._opponents if opponent.confirmed)
+
+    def predict(self, moved: Increment, observer_position: Array) -> None:
+        """Let opponents walk on while the robot moves; arguments as of `BallFilter.predict`."""
+        for opponent in self._opponents:
+            walk_on(opponent.point, self._parameters, moved, observer_position)
+
+    def update(self, features: Features, observer: Observer, since_last: float) -> tuple[Rejected, ...]:
+        """Use one picture, with the opponents predicted to its stamp.
+
+        Args:
+            features: Of the picture.
+            observer: Where the camera was.
+            since_last: Time since the last picture [s].
+
+        Returns:
+            Opponent features that were not used.
+        """
+        p = self._parameters
+        sightings = [
+            Sighting(feature, observer, GROUND, (p.extra_azimuth_spread, p.extra_elevation_spread))
+            for feature in features.features
+            if feature.kind is FeatureClass.OPPONENT
+        ]
+        distances = np.array(
+            [[opponent.point.distance(sighting) for sighting in sightings] for opponent in self._opponents]
+        ).reshape(len(self._opponents), len(sightings))
+        limits = np.array([gate(p.gate_probability, 2 if sighting.has_range else 1) for sighting in sightings])
+        pairs = assign(distances, limits)
+        for row, column in pairs:
+            self._opponents[row].point.see(sightings[column])
+            self._opponents[row].gain_confidence(sightings[column])
+        seen = {row for row, _ in pairs}
+        for row, opponent in enumerate(self._opponents):
+            if row not in seen:
+                self._miss(opponent, features, observer, since_last)
+        self._opponents = [opponent for opponent in self._opponents if opponent.confidence >= p.forgotten]
+        used = {column for _, column in pairs}
+        rejected = []
+        for column, sighting in enumerate(sightings):
+            if column in used:
+                continue
+            reason = self._give_birth(sighting)
+            if reason:
+                rejected.append(Rejected(features.stamp, reason, sighting.feature))
+        self._merge()
+        return tuple(rejected)
+
+    def hides(self, angles: Array, distance: float, observer: Observer) -> bool:
+        """Tell whether a confirmed opponent stands in front of a point at (2,) angles and a distance [m]."""
+        for opponent in self.confirmed:
+            seen, _ = observer.direction(opponent.point.state[:2], GROUND)
+            offset = observer.offset(opponent.point.state[:2], GROUND)[0]
+            nearer = float(np.hypot(offset[0], offset[1]))
+            half_width = math.atan2(self._parameters.body_radius, nearer)
+            if nearer < distance and abs(wrap_angle(float(seen[0] - angles[0]))) < half_width:
+                return True
+        return False
+
+    def _miss(self, opponent: Opponent, features: Features, observer: Observer, since_last: float) -> None:
+        p = self._parameters
+        angles, _ = observer.direction(opponent.point.state[:2], GROUND)
+        near = np.linalg.norm(observer.offset(opponent.point.state[:2], GROUND)[0]) < p.visible_range
+        expected = near and in_view(features, angles, p.view_margin)
+        opponent.confidence *= math.exp(-since_last / (p.missed_time if expected else p.hidden_time))
+
+    def _give_birth(self, sighting: Sighting) -> str:
+        """Begin an opponent; return why not, or ""."""
+        p = self._parameters
+        if not sighting.has_range:
+            return "an unknown opponent without range"
+        position, _ = sighting.position()
+        if math.dist(position, (sighting.observer.pose.x, sighting.observer.pose.y)) > p.longest_range:
+            return "an unknown opponent too far away"
+        if len(self._opponents) >= p.most:
+            return "more opponents than can be on the field"
+        self._opponents.append(Opponent(p, sighting))
+        return ""
+
+    def _merge(self) -> None:
+        """Let the surest stay of opponents that stand inside each other."""
+        kept: list[Opponent] = []
+        for opponent in sorted(self._opponents, key=lambda each: -each.confidence):
+            place = opponent.point.state[:2]
+            if all(math.dist(place, other.point.state[:2]) > self._parameters.body_radius for other in kept):
+                kept.append(opponent)
+        self._opponents = [opponent for opponent in self._opponents if opponent in kept]
+
+
+def walk_on(point: MovingPoint, parameters: OpponentParameters, moved: Increment, observer_position: Array) -> None:
+    """Predict an opponent, whose velocity fades with `velocity_time`."""
+    p = parameters
+    offset = point.state[:2] - observer_position
+    across = np.array([-offset[1], offset[0]])
+    noise = np.eye(2) * (
+        p.position_noise_per_second**2 * moved.duration + p.position_noise_per_metre**2 * moved.distance
+    ) + np.outer(across, across) * (p.position_noise_per_radian**2 * moved.turned)
+    keep = math.exp(-moved.duration / p.velocity_time)
+    point.predict(moved.duration, keep, noise, p.velocity_noise**2 * moved.duration)

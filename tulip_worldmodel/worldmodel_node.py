@@ -1,0 +1,103 @@
+"""Node "worldmodel": odometry and features in; world_state, robot_pose and the transform map to odom out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nav_msgs.msg import Odometry as OdometryMessage
+
+from tulip_description.field import FieldError, load_field
+from tulip_description.planar import Pose2D
+from tulip_motion.messages import odometry_from_message
+from tulip_msgs.msg import Features as FeaturesMessage
+from tulip_ros import topics
+from tulip_ros.errors import BadInputError
+from tulip_ros.run import ComponentNode, run
+from tulip_ros.time import stamp_of
+from tulip_worldmodel.messages import (
+    features_from_message,
+    map_to_odom_message,
+    robot_pose_to_message,
+    world_state_to_message,
+)
+from tulip_worldmodel.rejected import Rejected
+from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
+from tulip_worldmodel.world_state import WorldState
+
+NEW_GAME = 1_000_000_000  # [ns] a stamp that lies further back than this belongs to a simulation begun anew
+
+
+@dataclass(frozen=True)
+class WorldModelNodeParameters(WorldModelParameters):
+    """Parameters of the world model and of its node."""
+
+    start_x: float = -1.5  # [m] base_footprint in map when the node starts: where a person puts the robot
+    start_y: float = 0.0  # [m]
+    start_yaw: float = 0.0  # [rad]
+    field_file: str = ""  # "" for the AdultSize field of 2013
+    publish_period: float = 0.02  # [s] between two world states: strategy decides at most that often
+
+
+class WorldModelNode(ComponentNode):
+    """Turns messages into calls of the world model and its answers into messages."""
+
+    def __init__(self) -> None:
+        """Make the core and connect it."""
+        super().__init__("worldmodel")
+        self._parameters = self.load(WorldModelNodeParameters())
+        self._last_odometry: int | None = None  # stamp [ns]
+        self._last_published: int | None = None  # stamp [ns]
+        self._world = self._new_world()
+        self._world_state = self.sender(topics.WORLD_STATE)
+        self._robot_pose = self.sender(topics.ROBOT_POSE)
+        self._transforms = self.sender(topics.TF)
+        self.listen(topics.ODOMETRY, self._on_odometry)
+        self.listen(topics.FEATURES, self._on_features)
+
+    def _new_world(self) -> WorldModel:
+        p = self._parameters
+        try:
+            field = load_field(p.field_file or None)
+        except FieldError as error:
+            raise BadInputError(f"Parameter field_file of node 'worldmodel': {error}") from error
+        return WorldModel(p, field, Pose2D(p.start_x, p.start_y, p.start_yaw))
+
+    def _on_odometry(self, message: OdometryMessage) -> None:
+        last = self._last_odometry
+        stamp = stamp_of(message)
+        if last is not None and stamp < last - NEW_GAME:
+            self.get_logger().info("time went back: the world model begins anew at its start pose")
+            self._world, self._last_published = self._new_world(), None
+        self._last_odometry = stamp
+        self._world.add_odometry(odometry_from_message(message))
+        published = self._last_published
+        if published is None or stamp - published >= self._parameters.publish_period * 1e9:
+            self._last_published = stamp
+            self._publish(self._world.state(stamp))
+
+    def _on_features(self, message: FeaturesMessage) -> None:
+        rejected = self._world.add_features(features_from_message(message))
+        for entry in rejected:
+            if entry.feature is None:
+                self.health.count("pictures not used", f"picture not used: {entry.reason}")
+            self.get_logger().debug(describe(entry))
+
+    def _publish(self, world: WorldState) -> None:
+        self._world_state.publish(world_state_to_message(world))
+        self._robot_pose.publish(robot_pose_to_message(world))
+        self._transforms.publish(map_to_odom_message(world))
+
+
+def describe(rejected: Rejected) -> str:
+    """Return one line about what was not used."""
+    what = "picture" if rejected.feature is None else rejected.feature.kind.name.lower()
+    return f"{what} at {rejected.stamp} ns not used: {rejected.reason}"
+
+
+def main() -> None:
+    """Run the node."""
+    run(WorldModelNode)
+
+
+if __name__ == "__main__":
+    main()
