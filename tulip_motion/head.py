@@ -28,9 +28,9 @@ class HeadParameters:
     acceleration: float = 30.0  # [rad/s^2] 0.1 N m for a head of 0.003 kg m^2: the trunk does not feel it
     limit_margin: float = 0.02  # [rad] kept from the joints' stops
     search_pan: float = 2.4  # [rad] to both sides, within the joint's range
-    search_tilt_far: float = 0.30  # [rad] down: a picture 46 deg high reaches from 1.4 m to the horizon
-    search_tilt_near: float = 0.95  # [rad] down: from the own feet to 1.9 m
-    near_distance: float = 1.4  # [m] a target lost nearer than this is searched near first
+    search_tilt_far: float = 0.38  # [rad] down: a picture 59 deg high reaches from 1 m to the horizon
+    search_tilt_near: float = 0.95  # [rad] down: from the own feet to 2.4 m
+    near_distance: float = 1.2  # [m] a target lost nearer than this is searched near first
     arrived: float = 0.03  # [rad] from the end of a sweep, where the next one begins
     glance_period: float = 3.0  # [s] from the end of a glance to the next
     glance_length: float = 0.7  # [s] way there included: a turn of 1 rad takes 0.4 s

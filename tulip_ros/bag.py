@@ -18,7 +18,7 @@ from tulip_ros.errors import BadInputError
 from tulip_ros.topics import Quality
 
 CHUNK = 512 * 1024  # [B] compressed and written at one time; what a crash loses at most
-FLUSH = 1.0  # [s] longest time that a message waits for its chunk to be written
+FLUSH = 0.5  # [s] after which a chunk is written; looked at every 0.5 s, so a message waits 1 s at most
 FREE = 500 * 2**20  # [B] of disk space that a recording leaves free
 FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
@@ -130,7 +130,7 @@ class Bag:
         span.messages += 1
 
     def flush(self) -> None:
-        """Bring what was written to disk when the last time is a second ago; call it often.
+        """Bring what was written to disk when the last time is FLUSH ago; call it often.
 
         Raises:
             OSError: if the file cannot be written.

@@ -19,7 +19,7 @@ from tulip_ros.errors import BadInputError
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.topics import Quality
 
-DISCOVERY = 0.5  # [s] between two looks for new topics
+LOOK = 0.5  # [s] between two looks for new topics and at the file
 WAITING = 100  # messages of one topic that wait while a chunk is compressed
 HIDDEN = re.compile(r"(^|/)_|^/parameter_events$")
 
@@ -83,7 +83,7 @@ class RecorderNode(ComponentNode):
             self.subscribe(
                 self.resolve_topic_name(topic.name), topic.type_name, topic.quality, ReliabilityPolicy.RELIABLE
             )
-        self.every(DISCOVERY, self.discover)
+        self.every(LOOK, self.discover)
 
     def begin(self, path: str) -> Path:
         """Begin a recording and return its file.

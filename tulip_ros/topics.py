@@ -239,3 +239,20 @@ def markdown_tables() -> str:
     lines += ["", "| service or action | type | server | meaning |", "| --- | --- | --- | --- |"]
     lines += [f"| `{s.name}` | {s.type_name} | {s.server} | {s.meaning} |" for s in SERVICES]
     return "\n".join(lines) + "\n"
+
+
+def markdown_graph() -> str:
+    """Return the node graph as a mermaid diagram for the documentation: who tells whom what."""
+    lines = ["```mermaid", "graph LR"]
+    edges: dict[tuple[str, str], list[str]] = {}
+    for topic in TOPICS:
+        if ALL_NODES in (topic.publishers, topic.subscribers):
+            continue
+        for sender in topic.publishers:
+            for listener in topic.subscribers:
+                edges.setdefault((sender, listener), []).append(topic.name)
+    edges.setdefault(("strategy", KICK.server), []).append(f"{KICK.name} (action)")
+    for (sender, listener), names in edges.items():
+        lines.append(f'    {sender} -->|"{"<br/>".join(names)}"| {listener}')
+    lines += ['    referee(["referee program"]) -->|"UDP"| game_input', '    person(["menu, tools"]) --> user_input', "```"]
+    return "\n".join(lines) + "\n"

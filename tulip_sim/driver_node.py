@@ -38,13 +38,11 @@ from tulip_sim.parameters import WorldParameters
 from tulip_sim.referee import Referee, RefereeParameters
 from tulip_sim.referee_udp import RefereeSocket
 from tulip_sim.scenario import SCENARIOS, make_scenario
+from tulip_sim.timing import CAMERA_TICKS, SLOW_TICKS, TICK
 from tulip_sim.world import World
 from tulip_strategy.game_controller import REFEREE_PORT
 from tulip_vision.lens import head_camera_lens
 
-TICK = 4  # [ms]
-CLOCK_TICKS = 5  # 50 Hz is enough for nodes that fire on messages
-CAMERA_TICKS = 16  # 15.6 pictures a second
 LAG = 0.05  # [s] behind the wall clock after which the lost time is given up
 REPEAT = 0.1  # [s] of wall-clock time between repetitions of sensors that nobody answered
 PUSH_TIME = 100  # [ms] over which a push's impulse is spread
@@ -163,7 +161,7 @@ class DriverNode(ComponentNode):
         if packet is not None and self._referee_socket is not None:
             self._referee_socket.send(packet)
             self._referee_socket.replies()  # emptied, so that they do not fill the system's buffer
-        if self._tick % CLOCK_TICKS == 0:
+        if self._tick % SLOW_TICKS == 0:
             self._clock_sender.publish(Clock(clock=to_message(truth.stamp)))
             self._truth.publish(truth_to_message(truth, self._referee))
         if self._parameters.camera and self._tick % CAMERA_TICKS == 0:

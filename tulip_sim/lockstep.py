@@ -27,6 +27,7 @@ from tulip_sim.camera import CameraParameters, CameraRenderer
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.referee import Outcome, Referee, RefereeParameters
 from tulip_sim.scenario import Scenario
+from tulip_sim.timing import CAMERA_TICKS, DECISION_TICKS, FEATURE_DELAY_TICKS, SLOW_TICKS, TICK
 from tulip_sim.truth import Truth
 from tulip_sim.world import World
 from tulip_strategy.game_input import GameInput, GameInputParameters
@@ -38,12 +39,6 @@ from tulip_vision.lens import Lens, head_camera_lens
 from tulip_vision.pipeline import Vision, VisionParameters
 from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParameters
 from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
-
-TICK = 4  # [ms] one control tick
-SLOW_TICKS = 5  # odometry, head and game input run at 50 Hz
-DECISION_TICKS = 10  # world state and strategy run at 25 Hz
-CAMERA_TICKS = 16  # 15.6 pictures a second
-FEATURE_DELAY_TICKS = 12  # 48 ms from the shutter to the features
 
 Picture = NDArray[np.uint8]
 Listener = Callable[[str, int, object], None]

@@ -109,7 +109,9 @@ def _draw(drawn: NDArray[np.uint8], feature: Feature, view: View) -> None:
     text = f"{_name(feature.kind)} {feature.confidence:.2f}"
     if feature.kind == FeatureClass.BALL:
         direction = direction_of(feature.azimuth, feature.elevation)
-        cv2.circle(drawn, (u, v), round(feature.angular_radius / view.angle_per_pixel(direction)), colour, 1, cv2.LINE_AA)
+        cv2.circle(
+            drawn, (u, v), round(feature.angular_radius / view.angle_per_pixel(direction)), colour, 1, cv2.LINE_AA
+        )
     else:
         cv2.drawMarker(drawn, (u, v), colour, cv2.MARKER_CROSS, 12, 1)
     _label(drawn, (u + 8, v - 6), text, colour, 0.4)
@@ -117,7 +119,8 @@ def _draw(drawn: NDArray[np.uint8], feature: Feature, view: View) -> None:
 
 def _polyline(drawn: NDArray[np.uint8], points: Array, colour: Colour) -> None:
     """Draw the parts of a polyline whose points are in front of the camera."""
-    good = np.isfinite(points).all(axis=1) & (np.abs(np.nan_to_num(points)) < 10_000).all(axis=1)
+    with np.errstate(invalid="ignore"):
+        good: NDArray[np.bool_] = (np.abs(points) < 10_000.0).all(axis=1)  # NaN is not
     for index in np.flatnonzero(good[:-1] & good[1:]):
         first, second = np.rint(points[index]).astype(int), np.rint(points[index + 1]).astype(int)
         cv2.line(drawn, (int(first[0]), int(first[1])), (int(second[0]), int(second[1])), colour, 1, cv2.LINE_AA)

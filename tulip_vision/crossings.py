@@ -110,15 +110,20 @@ def find_penalty_marks(
 ) -> Findings:
     """Return white spots on the carpet that have the penalty mark's size and stand alone."""
     level = 0.5 * (_carpet_whiteness(segmentation) + 255.0 * min(1.0, 0.75 * segmentation.brightness))
-    below = view.sines < -view.height / math.hypot(view.height, parameters.mark_range)
-    mask = ((segmentation.whiteness > np.uint8(level)) & (segmentation.on_carpet != 0) & below).astype(np.uint8)
+    lowest = -view.height / math.hypot(view.height, parameters.mark_range)
+    close = np.flatnonzero(view.sines[:, view.lens.width // 2] < lowest)
+    if not len(close):
+        return Findings()
+    top = int(close[0])
+    white = cv2.compare(segmentation.whiteness[top:], level, cv2.CMP_GT)
+    mask = np.asarray(cv2.bitwise_and(white, segmentation.on_carpet[top:]), dtype=np.uint8)
     features: list[Feature] = []
     refusals: list[Refusal] = []
     rows, columns = mask.shape
     for points, _ in patches(mask, LEAST_MARK_AREA, MOST_MARK_CANDIDATES):
         if len(points) < 6 or points.min() <= 0 or points[:, 0].max() >= columns - 1 or points[:, 1].max() >= rows - 1:
             continue
-        ground = view.ground(view.directions_at(points[:, 0], points[:, 1]))
+        ground = view.ground(view.directions_at(points[:, 0], points[:, 1] + top))
         centre = 0.5 * (ground.max(axis=0) + ground.min(axis=0))
         extent = 2.0 * np.linalg.norm(ground - centre, axis=1).max()
         if not 0.6 * parameters.mark_size <= extent <= 1.9 * parameters.mark_size:
@@ -130,7 +135,7 @@ def find_penalty_marks(
         own = abs(centre[0]) < 0.35 and abs(centre[1]) < 0.3
         if carpet < 0.9 or own or any(_distance(centre, piece.start, piece.end) < 0.15 for piece in lines.pieces):
             u, v = points.mean(axis=0)
-            refusals.append(Refusal(FeatureClass.PENALTY_MARK, (float(u), float(v)), "does not stand alone"))
+            refusals.append(Refusal(FeatureClass.PENALTY_MARK, (float(u), float(v) + top), "does not stand alone"))
             continue
         features.append(_feature(FeatureClass.PENALTY_MARK, centre, 0.6, view))
     return Findings(tuple(features), tuple(refusals))

@@ -12,7 +12,7 @@ from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
 from tulip_vision.segmentation import Colour, Segmentation
 from tulip_vision.upright import Upright, axis_samples, find_uprights, foot_on_ground
-from tulip_vision.view import View, direction_of
+from tulip_vision.view import Array, View, direction_of
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,8 @@ def find_goal_posts(segmentation: Segmentation, view: View, parameters: GoalPara
 def _examine(upright: Upright, segmentation: Segmentation, view: View, parameters: GoalParameters) -> Feature | str:
     pixel = upright.pixel_angle
     distance = upright.distance(view)
+    if _blue_above(upright, segmentation, view):
+        return "blue above it: a pole"
     if upright.foot_seen and distance <= parameters.farthest:
         foot, elevation = foot_on_ground(view, upright.azimuth, upright.low, parameters.diameter / 2.0)
         slant = math.hypot(distance, view.height)
@@ -95,9 +97,7 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
         direction = direction_of(upright.azimuth, elevation)
         azimuth_spread, elevation_spread = view.spreads(direction, 2.0 if upright.cut else 1.0)
         confidence = (0.75 + 0.25 * bar) * min(1.0, yellow / 0.9)
-        return Feature(
-            FeatureClass.GOAL_POST, upright.azimuth, elevation, azimuth_spread, elevation_spread, confidence
-        )
+        return Feature(FeatureClass.GOAL_POST, upright.azimuth, elevation, azimuth_spread, elevation_spread, confidence)
     if upright.foot_seen:
         return f"foot {distance:.1f} m away"
     if not upright.reaches_up:
@@ -113,23 +113,31 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
     return Feature(FeatureClass.GOAL_POST, upright.azimuth, nan, azimuth_spread, nan, confidence=0.5)
 
 
-def _crossbar(segmentation: Segmentation, view: View, foot: np.ndarray, parameters: GoalParameters) -> float:
+def _blue_above(upright: Upright, segmentation: Segmentation, view: View) -> bool:
+    """Return whether the patch ends below something blue."""
+    elevations = upright.high + upright.pixel_angle * np.arange(1.0, 8.0)
+    directions = np.stack([direction_of(upright.azimuth, elevation) for elevation in elevations])
+    classes, _ = view.sample(segmentation.classes, view.pixels_of_directions(directions))
+    return int(np.count_nonzero(classes & Colour.BLUE)) >= 2
+
+
+def _crossbar(segmentation: Segmentation, view: View, foot: Array, parameters: GoalParameters) -> float:
     """Return how much of a crossbar leaves the post's upper end on one side, 0 to 1; 0 if it is out of view.
 
     Which way the goal faces is not known: the bar is looked for across the line of sight, within 60 deg.
     """
     ahead = (foot - view.position[:2]) / max(float(np.linalg.norm(foot - view.position[:2])), 1e-6)
     across = np.array([-ahead[1], ahead[0]])
-    best = 0.0
-    reach = np.linspace(0.15, 0.5, 6)[:, None] * parameters.width
-    for turn in np.radians([0.0, -30.0, 30.0, -60.0, 60.0]):
-        way = math.cos(turn) * across + math.sin(turn) * ahead
-        for side in (1.0, -1.0):
-            points = np.column_stack([foot + side * reach * way, np.full(len(reach), parameters.height)])
-            values, inside = view.sample(segmentation.classes, view.pixels(points))
-            if inside.sum() >= 3:
-                best = max(best, float(((values & Colour.YELLOW) != 0)[inside].mean()))
-    return best
+    turns = np.radians([0.0, -30.0, 30.0, -60.0, 60.0])
+    ways = np.cos(turns)[:, None] * across + np.sin(turns)[:, None] * ahead
+    ways = np.concatenate([ways, -ways])
+    reach = np.linspace(0.15, 0.5, 6) * parameters.width
+    places = foot + ways[:, None, :] * reach[:, None]
+    points = np.concatenate([places, np.full((*places.shape[:2], 1), parameters.height)], axis=2)
+    values, inside = view.sample(segmentation.classes, view.pixels(points.reshape(-1, 3)))
+    yellow = ((values & Colour.YELLOW) != 0).reshape(len(ways), len(reach))
+    seen = inside.reshape(yellow.shape).sum(axis=1)
+    return float(np.where(seen >= 3, yellow.sum(axis=1) / np.maximum(seen, 1), 0.0).max())
 
 
 def _angle(first: float, second: float) -> float:

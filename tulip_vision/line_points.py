@@ -10,11 +10,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from tulip_vision.segmentation import Colour, Segmentation
 from tulip_vision.view import Array, View
+
+LONGEST_REACH = 60
+"""[px] lines at the robot's own feet are not looked for beyond that."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,8 @@ def find_line_points(segmentation: Segmentation, view: View, parameters: LinePoi
         return LinePoints(np.empty((0, 2)), np.empty(0, dtype=np.bool_), np.empty((0, 2)), np.empty((0, 2)))
     first, last = int(rows[0]), int(rows[-1]) + 1
     contrast = _contrast(slant, segmentation.brightness, view, parameters)
-    whiteness, green = segmentation.whiteness, segmentation.mask(Colour.GREEN)
+    # Where there is no carpet the side is white beyond measure: nothing stands out from it.
+    side = cv2.max(segmentation.whiteness, cv2.compare(segmentation.mask(Colour.GREEN), 0, cv2.CMP_EQ))
     found = []
     middle = int(np.searchsorted(-slant[first:last], -parameters.near)) + first
     margin = 12  # [px] runs at the border between the two bands belong to both
@@ -96,24 +101,26 @@ def find_line_points(segmentation: Segmentation, view: View, parameters: LinePoi
     ):
         if high - low < 2:
             continue
-        columns = np.arange(step // 2, view.lens.width, step)
-        cut, place = _cut(
-            np.ascontiguousarray(whiteness[low:high, columns].T).astype(np.int16),
-            np.ascontiguousarray(green[low:high, columns].T),
-            np.broadcast_to(across_row[low:high], (len(columns), high - low)),
-            np.broadcast_to(contrast[low:high], (len(columns), high - low)),
-        )
-        found.append(np.column_stack([columns[cut], place + low]))
+        columns = slice(step // 2, view.lens.width, step)
+        reach = np.minimum(np.rint(across_row[low:high]), LONGEST_REACH).astype(np.intp)
+        place = np.arange(low, high)
+        sides = side[:, columns]
+        higher = cv2.max(sides[np.maximum(place - reach, 0)], sides[np.minimum(place + reach, len(side) - 1)])
+        own = segmentation.whiteness[low:high, columns]
+        white = cv2.subtract(own, higher) > contrast[low:high, None]
+        cut, where = _runs(np.ascontiguousarray(white.T), own.T, reach[None, :].repeat(white.shape[1], axis=0))
+        found.append(np.column_stack([step // 2 + step * cut, where + low]))
     steps = np.where(slant[first:last] < parameters.near, parameters.row_step, parameters.row_step // 4)
     chosen = first + np.flatnonzero((np.arange(first, last) % steps) == 0)
-    shape = (len(chosen), view.lens.width)
-    cut, place = _cut(
-        whiteness[chosen].astype(np.int16),
-        green[chosen],
-        np.broadcast_to(across_column[chosen][:, None], shape),
-        np.broadcast_to(contrast[chosen][:, None], shape),
-    )
-    found.append(np.column_stack([place, chosen[cut]]))
+    reach = np.minimum(np.rint(across_column[chosen]), LONGEST_REACH).astype(np.intp)[:, None]
+    place = np.arange(view.lens.width)
+    begin = (chosen * view.lens.width)[:, None]
+    before = side.ravel()[np.maximum(place - reach, 0) + begin]
+    after = side.ravel()[np.minimum(place + reach, view.lens.width - 1) + begin]
+    own = segmentation.whiteness[chosen]
+    white = cv2.subtract(own, cv2.max(before, after)) > contrast[chosen, None]
+    cut, where = _runs(white, own, np.broadcast_to(reach, white.shape))
+    found.append(np.column_stack([where, chosen[cut]]))
     pixels = np.concatenate(found)
     nearest = np.rint(pixels).astype(np.intp)
     pixels = pixels[segmentation.on_carpet[nearest[:, 1], nearest[:, 0]] != 0]
@@ -121,16 +128,20 @@ def find_line_points(segmentation: Segmentation, view: View, parameters: LinePoi
     ground = view.ground(rays @ view.rotation.T)
     with np.errstate(invalid="ignore"):
         far = np.hypot(*(ground - view.position[:2]).T) < parameters.farthest
-    own = (np.abs(ground[:, 0]) < parameters.own_reach) & (np.abs(ground[:, 1]) < parameters.own_half_width)
-    kept = far & ~own
+    own_feet = (np.abs(ground[:, 0]) < parameters.own_reach) & (np.abs(ground[:, 1]) < parameters.own_half_width)
+    kept = far & ~own_feet
     focal = float(view.lens.camera_matrix[0, 0])
     near = np.rint(pixels[kept, 1]).astype(np.intp) >= middle
     return LinePoints(pixels[kept], near, (rays[kept, :2] / rays[kept, 2:]) * focal, ground[kept])
 
 
 def _expected_widths(view: View, parameters: LinePointParameters) -> tuple[Array, Array, Array]:
-    """Return, per row of the picture, at its middle: a line's thickness if it runs across and if it runs along
-    the line of sight, with a margin [px], and the slant range [m] (infinite above the horizon)."""
+    """Return how thick lines appear in each row of the picture, at its middle.
+
+    Returns:
+        Thickness, with a margin, of a line across and of one along the line of sight [px], and the slant range
+        [m], infinite above the horizon.
+    """
     sines = view.sines[:, view.lens.width // 2].astype(np.float64)
     with np.errstate(divide="ignore"):
         slant = np.where(sines < -1e-3, view.height / -sines, np.inf)
@@ -141,55 +152,44 @@ def _expected_widths(view: View, parameters: LinePointParameters) -> tuple[Array
     return 1.6 * deep + 2.0, 1.6 * wide + 2.0, slant
 
 
-def _contrast(slant: Array, brightness: float, view: View, parameters: LinePointParameters) -> Array:
+def _contrast(slant: Array, brightness: float, view: View, parameters: LinePointParameters) -> NDArray[np.uint8]:
     """Return the contrast asked of a line in each row of the picture."""
     focal = float(view.lens.camera_matrix[1, 1])
     thickness = parameters.line_width * focal * view.height / slant**2  # [px] of a line across the line of sight
     share = np.clip(thickness / 3.0, 0.0, 1.0)  # three pixels thick: the middle keeps the paint's own colour
     asked = parameters.least_contrast + share * (parameters.contrast - parameters.least_contrast)
-    limited: Array = np.clip(asked * brightness, 9.0, 90.0)
-    return limited
+    return np.clip(asked * brightness, 9.0, 90.0).astype(np.uint8)
 
 
-def _cut(
-    whiteness: NDArray[np.int16], green: NDArray[np.uint8], reach: Array, contrast: Array
+def _runs(
+    white: NDArray[np.bool_], whiteness: NDArray[np.uint8], reach: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], Array]:
-    """Find the white runs in each row of an array.
+    """Find the runs of white pixels in each row of an array, and their middles.
 
     Args:
-        whiteness: (cuts, length).
-        green: (cuts, length) nonzero on carpet.
-        reach: (cuts, length) distance to the carpet on either side [px].
-        contrast: (cuts, length) least difference to both sides.
+        white: (cuts, length).
+        whiteness: (cuts, length) 0 to 255.
+        reach: (cuts, length) more than the expected width [px]; runs longer than twice that are no lines.
 
     Returns:
         (n,) index of the cut, and (n,) place of the run's middle within it [px].
     """
-    cuts, length = whiteness.shape
-    offset = np.minimum(np.rint(reach), 60).astype(np.intp)
-    place = np.arange(length)
-    base = (np.arange(cuts) * length)[:, None]
-    before = (np.maximum(place - offset, 0) + base).ravel()
-    after = (np.minimum(place + offset, length - 1) + base).ravel()
-    flat = whiteness.ravel()
-    higher_side = np.maximum(flat[before], flat[after])
-    white = flat - higher_side > contrast.ravel()
-    white &= (green.ravel()[before] != 0) & (green.ravel()[after] != 0)
+    cuts, length = white.shape
     padded = np.zeros((cuts, length + 2), dtype=np.int8)
-    padded[:, 1:-1] = white.reshape(cuts, length)
+    padded[:, 1:-1] = white
     change = np.diff(padded, axis=1).ravel()
-    start, end = np.flatnonzero(change > 0), np.flatnonzero(change < 0)  # each in units of length + 1
+    start, end = np.flatnonzero(change > 0), np.flatnonzero(change < 0)  # in a row of length + 1
     cut = start // (length + 1)
     start, end = start % (length + 1), end % (length + 1)
-    middle_offset = offset[cut, np.minimum((start + end) // 2, length - 1)]
-    thin = (end - start <= 2 * middle_offset) & (start > 0) & (end < length)
+    thin = (end - start <= 2 * reach[cut, (start + end) // 2]) & (start > 0) & (end < length)
     cut, start, end = cut[thin], start[thin], end[thin]
     middle = 0.5 * (start + end - 1)
     short = np.flatnonzero(end - start <= 10)
     if len(short):
+        # Few pixels: the centre of what each has of the paint is exact to a tenth of a pixel.
         window = start[short, None] - 2 + np.arange(14)
         used = (window >= 0) & (window < length) & (window < end[short, None] + 2)
-        values = flat[np.clip(window, 0, length - 1) + cut[short, None] * length].astype(np.float64)
+        values = whiteness[cut[short, None], np.clip(window, 0, length - 1)].astype(np.float64)
         floor = np.where(used, values, np.inf).min(axis=1, keepdims=True)
         weights = np.where(used, values - floor, 0.0)
         middle[short] = (weights * window).sum(axis=1) / np.maximum(weights.sum(axis=1), 1e-9)

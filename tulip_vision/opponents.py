@@ -24,6 +24,8 @@ MARKERS = {"cyan": (Colour.CYAN, Colour.MAGENTA), "magenta": (Colour.MAGENTA, Co
 MOST_CANDIDATES = 10
 """The largest patches in the marker's colour are looked at."""
 
+NEAR_REACH = 0.5
+"""[rad] half the angle that an opponent fills whose feet are below the picture: it is less than a metre away."""
 CARPET = Colour.GREEN | Colour.WHITE
 
 
@@ -100,9 +102,11 @@ def find_opponents(segmentation: Segmentation, view: View, parameters: OpponentP
         if isinstance(result, str):
             refusals.append(Refusal(FeatureClass.OPPONENT, marker.pixel, result))
             continue
-        distance = 2.0 if math.isnan(result.elevation) else view.height / math.tan(-result.elevation)
         opponents.append(result)
-        reach.append(1.2 * parameters.half_width / distance)
+        if math.isnan(result.elevation):
+            reach.append(NEAR_REACH)
+        else:
+            reach.append(1.2 * parameters.half_width * math.tan(-result.elevation) / view.height)
     return Findings(tuple(opponents), tuple(refusals))
 
 
@@ -117,7 +121,12 @@ def _marker(points: NDArray[np.int32], area: float, view: View) -> _Marker:
     turned = (azimuths - azimuths[0] + math.pi) % (2.0 * math.pi) - math.pi + azimuths[0]
     u, v = points.mean(axis=0)
     return _Marker(
-        float(turned.max()), float(turned.min()), float(elevations.min()), float(elevations.max()), area, (float(u), float(v))
+        float(turned.max()),
+        float(turned.min()),
+        float(elevations.min()),
+        float(elevations.max()),
+        area,
+        (float(u), float(v)),
     )
 
 
@@ -129,19 +138,16 @@ def _examine(
     # First look: the marker's own width and half of it on either side is enough to hit a foot or a leg.
     low = _contact(marker, 1.0 * width + 2.0 * pixel, segmentation, view, pixel)
     if low is None:
-        spread, _ = view.spreads(direction_of(marker.azimuth, marker.low), 3.0)
-        if view.inside(view.pixels_of_directions(direction_of(marker.azimuth, marker.low - 0.12)[None]))[0]:
-            return "no carpet below the marker"
-        if marker.area < 40.0 * parameters.least_area:
-            return "feet out of the picture and the marker small"
-        if marker.low + marker.high > 0.2:
-            return "feet out of the picture and the marker high up"
-        return Feature(FeatureClass.OPPONENT, marker.azimuth, nan, spread, nan, confidence=0.4)
+        return "no body that stands on the carpet below the marker"
+    if math.isnan(low):
+        return _without_feet(marker, markers, view, parameters)
     if low > -1e-3 or view.height / math.tan(-low) > parameters.farthest:
         return "stands beyond the carpet"
     # Second look, with the width that a body has at this range.
     distance = view.height / math.tan(-low)
     again = _contact(marker, parameters.half_width / distance, segmentation, view, pixel)
+    if again is not None and math.isnan(again):
+        return _without_feet(marker, markers, view, parameters)
     low = low if again is None else again
     distance = view.height / math.tan(-low)
     marker_height = view.height + distance * math.tan(0.5 * (marker.low + marker.high))
@@ -165,6 +171,17 @@ def _examine(
     )
 
 
+def _without_feet(marker: _Marker, markers: list[_Marker], view: View, parameters: OpponentParameters) -> Feature | str:
+    """Return an opponent so close that its feet are below the picture: its azimuth only."""
+    if marker.area < 40.0 * parameters.least_area:
+        return "feet out of the picture and the marker small"
+    if marker.low + marker.high > 0.2:
+        return "feet out of the picture and the marker high up"
+    whole = _joined(marker, markers, NEAR_REACH)
+    spread, _ = view.spreads(direction_of(whole.azimuth, whole.low), 3.0)
+    return Feature(FeatureClass.OPPONENT, whole.azimuth, nan, math.hypot(spread, 0.05), nan, confidence=0.4)
+
+
 def _joined(marker: _Marker, markers: list[_Marker], reach: float) -> _Marker:
     """Return a marker together with the others of the same opponent: those within `reach` [rad] of it."""
     same = [other for other in markers if _angle(other.azimuth, marker.azimuth) < reach]
@@ -184,7 +201,9 @@ def _fan(azimuths: Array, elevations: Array) -> Array:
 
 
 def _contact(marker: _Marker, half: float, segmentation: Segmentation, view: View, pixel: float) -> float | None:
-    """Return the elevation at which the body's lowest point meets the carpet [rad]; None if it is not seen.
+    """Return the elevation at which the body's lowest point meets the carpet [rad].
+
+    NaN means that the body goes on below the picture; None that no body stands on the carpet there.
 
     Args:
         marker: Where to start.
@@ -193,9 +212,9 @@ def _contact(marker: _Marker, half: float, segmentation: Segmentation, view: Vie
         view: Of the picture.
         pixel: Angle of one pixel [rad].
     """
-    azimuths = np.linspace(marker.azimuth - half, marker.azimuth + half, 15)
+    azimuths = np.linspace(marker.azimuth - half, marker.azimuth + half, 13)
     step = 2.0 * pixel
-    bottom = -math.radians(80.0)
+    bottom = view.lowest_elevation - 3.0 * step
     elevations = np.arange(0.5 * (marker.low + marker.high), bottom, -step)[:240]
     pixels = view.pixels_of_directions(_fan(azimuths, elevations))
     classes, inside = view.sample(segmentation.classes, pixels)
@@ -208,17 +227,14 @@ def _contact(marker: _Marker, half: float, segmentation: Segmentation, view: Vie
     has = begins.any(axis=0)
     first = begins.argmax(axis=0)
     starts_on_body = ~carpet[0] & seen[0]
-    usable = has & starts_on_body
-    if np.count_nonzero(usable) < 2:
-        return None
-    # Cuts that leave the picture before they meet carpet would have been lower still: the feet are cut off.
-    if np.count_nonzero(starts_on_body & ~has & ~seen[-1]) > np.count_nonzero(usable):
-        return None
     # A body hides carpet: above its foot the picture shows something else inside the carpet's outline.
     painted = (classes & (Colour.ORANGE | Colour.YELLOW | Colour.BLUE)) != 0
     hides = ~carpet & (on_carpet != 0).reshape(shape) & ~painted.reshape(shape)
     hidden = np.array([np.count_nonzero(hides[: first[column], column]) for column in range(len(azimuths))])
-    standing = usable & (hidden >= 2)
+    standing = has & starts_on_body & (hidden >= 2)
+    hidden_below = np.count_nonzero(hides, axis=0)
+    if np.count_nonzero(starts_on_body & ~has & (hidden_below >= 2)) >= 2:
+        return nan  # some cuts leave the picture on the body: its lowest point is not seen
     if np.count_nonzero(standing) < 2:
         return None
     rows = np.sort(first[standing])

@@ -106,7 +106,10 @@ def stages(parameters: VisionParameters) -> tuple[Stage, ...]:
         Stage("find line points", seen, "line_points", lambda s, v: find_line_points(s, v, p.line_points)),
         Stage("join lines", ("line_points", "view"), "lines", lambda q, v: find_lines(q, v, p.lines)),
         Stage(
-            "find crossings", ("lines", *seen), "crossings", lambda lines, s, v: find_crossings(lines, s, v, p.crossings)
+            "find crossings",
+            ("lines", *seen),
+            "crossings",
+            lambda lines, s, v: find_crossings(lines, s, v, p.crossings),
         ),
         Stage(
             "find penalty marks",
@@ -212,6 +215,4 @@ def _check_picture(picture: Picture, lens: Lens) -> None:
     expected = (lens.height, lens.width, 3)
     if not isinstance(picture, np.ndarray) or picture.shape != expected or picture.dtype != np.uint8:
         got = f"{picture.shape} {picture.dtype}" if isinstance(picture, np.ndarray) else type(picture).__name__
-        raise ValueError(
-            f"picture is {got}; expected {expected} uint8, BGR, the size of the lens's camera info"
-        )
+        raise ValueError(f"picture is {got}; expected {expected} uint8, BGR, the size of the lens's camera info")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from math import nan
 
 import cv2
 import numpy as np
@@ -31,7 +30,7 @@ class PoleParameters:
         segment_height: Of one coloured segment [m].
         least_area: Smallest patch looked at [px^2].
         width_tolerance: Largest ratio, either way, between the seen width and the one that fits the place.
-        least_match: Share of the visible axis that must have the pattern's colours.
+        least_match: Share of each visible segment's axis that must have the pattern's colour.
         farthest: Largest distance along the ground [m].
     """
 
@@ -39,7 +38,7 @@ class PoleParameters:
     segment_height: float = 0.20
     least_area: float = 40.0  # [px^2] at 8 m a pole is 11 px wide and 30 px high
     width_tolerance: float = 1.6
-    least_match: float = 0.7
+    least_match: float = 0.55
     farthest: float = 9.0  # [m]
 
     def __post_init__(self) -> None:
@@ -59,15 +58,22 @@ class PoleParameters:
 
 def find_poles(segmentation: Segmentation, view: View, parameters: PoleParameters) -> Findings:
     """Return the landmark poles with the direction of their feet."""
-    if not (segmentation.classes & Colour.BLUE).any():
+    blue = np.bitwise_and(segmentation.mask(Colour.BLUE), view.below_horizon)
+    left, top, width, height = cv2.boundingRect(blue)
+    if width == 0:
         return Findings()
+    # Yellow segments lie at most one blue one above or below; with some slack for the view from above.
+    part = slice(max(top - 2 * height, 0), top + 3 * height), slice(max(left - width, 0), left + 2 * width)
+    mask = np.zeros_like(blue)
     # Where yellow meets blue the blend is neither: close gaps of up to four pixels, upwards only.
-    mask = cv2.morphologyEx(
-        np.minimum(segmentation.mask(Colour.YELLOW | Colour.BLUE), 1), cv2.MORPH_CLOSE, np.ones((5, 1), dtype=np.uint8)
+    mask[part] = cv2.morphologyEx(
+        np.minimum(segmentation.classes[part] & np.uint8(Colour.YELLOW | Colour.BLUE), 1) * np.uint8(255),
+        cv2.MORPH_CLOSE,
+        np.ones((5, 1), dtype=np.uint8),
     )
     poles: list[Feature] = []
     refusals: list[Refusal] = []
-    for upright in find_uprights(np.asarray(mask, dtype=np.uint8), segmentation, view, parameters.least_area):
+    for upright in find_uprights(mask, segmentation, view, parameters.least_area):
         result = _examine(upright, segmentation, view, parameters)
         if isinstance(result, Feature):
             poles.append(result)
@@ -96,7 +102,10 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
     best, kind = 0.0, FeatureClass.POLE_YELLOW_BLUE_YELLOW
     for candidate, pattern in PATTERNS.items():
         wanted = np.array([int(colour) for colour in pattern], dtype=np.uint8)[segments]
-        match = float(((classes & wanted) != 0)[inside].mean())
+        fits = ((classes & wanted) != 0) & inside
+        parts = [inside & (segments == number) for number in range(len(pattern))]
+        shares = [float(fits[part].sum() / part.sum()) for part in parts if part.any()]
+        match = min(shares)  # every segment in the picture must fit: two of three could be a goal post
         if match > best:
             best, kind = match, candidate
     if best < parameters.least_match:
@@ -107,5 +116,6 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
     smallest = 0.0 if upright.cut else fitting / parameters.width_tolerance - slack
     if not smallest <= upright.width <= fitting * parameters.width_tolerance + slack:
         return f"{upright.width * distance:.2f} m wide"
-    azimuth_spread, elevation_spread = view.spreads(direction_of(upright.azimuth, elevation), 2.0 if upright.cut else 1.0)
-    return Feature(kind, upright.azimuth, elevation, azimuth_spread, elevation_spread, best, end_azimuth=nan)
+    doubt = 2.0 if upright.cut else 1.0
+    azimuth_spread, elevation_spread = view.spreads(direction_of(upright.azimuth, elevation), doubt)
+    return Feature(kind, upright.azimuth, elevation, azimuth_spread, elevation_spread, best)

@@ -8,7 +8,7 @@ with the brightness of the carpet in the picture, so a dark hall needs no other 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntFlag
 from functools import cached_property
 
@@ -61,18 +61,24 @@ class ColourBox:
                 raise ValueError(f"{name} is {bounds}; expected lower <= upper, both from 0 to 1")
 
 
-def _boxes() -> dict[Colour, ColourBox]:
-    # Hues of the rules of 2013, widened to what the pictures of that time show under hall lights.
-    return {
-        Colour.GREEN: ColourBox((68.0, 170.0), (0.25, 1.0), (0.12, 1.0)),  # 68: yellowish carpets
-        Colour.WHITE: ColourBox((0.0, 360.0), (0.0, 0.28), (0.55, 1.0)),
-        Colour.ORANGE: ColourBox((350.0, 38.0), (0.52, 1.0), (0.28, 1.0)),
-        Colour.YELLOW: ColourBox((41.0, 66.0), (0.42, 1.0), (0.30, 1.0)),
-        Colour.BLUE: ColourBox((204.0, 250.0), (0.45, 1.0), (0.18, 1.0)),
-        Colour.CYAN: ColourBox((172.0, 203.0), (0.35, 1.0), (0.28, 1.0)),
-        Colour.MAGENTA: ColourBox((285.0, 346.0), (0.32, 1.0), (0.28, 1.0)),
-        Colour.DARK: ColourBox((0.0, 360.0), (0.0, 1.0), (0.0, 0.22)),
-    }
+@dataclass(frozen=True)
+class ColourBoxes:
+    """The box of each colour class: hues of the rules of 2013, widened to what pictures of that time show."""
+
+    green: ColourBox = ColourBox((68.0, 170.0), (0.25, 1.0), (0.12, 1.0))  # 68: yellowish carpets
+    white: ColourBox = ColourBox((0.0, 360.0), (0.0, 0.28), (0.55, 1.0))
+    orange: ColourBox = ColourBox((350.0, 38.0), (0.52, 1.0), (0.28, 1.0))
+    yellow: ColourBox = ColourBox((41.0, 66.0), (0.42, 1.0), (0.30, 1.0))
+    blue: ColourBox = ColourBox((204.0, 250.0), (0.45, 1.0), (0.18, 1.0))
+    cyan: ColourBox = ColourBox((172.0, 203.0), (0.35, 1.0), (0.28, 1.0))
+    magenta: ColourBox = ColourBox((285.0, 346.0), (0.32, 1.0), (0.28, 1.0))
+    dark: ColourBox = ColourBox((0.0, 360.0), (0.0, 1.0), (0.0, 0.22))
+
+    def of(self, colour: Colour) -> ColourBox:
+        """Return the box of one class."""
+        box = getattr(self, str(colour.name).lower())
+        assert isinstance(box, ColourBox)  # the fields bear the names of the classes
+        return box
 
 
 @dataclass(frozen=True)
@@ -80,7 +86,7 @@ class SegmentationParameters:
     """Colour classes and how the carpet's outline is found.
 
     Attributes:
-        boxes: The box of each colour class.
+        colours: The box of each colour class.
         reference_brightness: Value of the carpet for which the boxes are given, 0 to 1.
         brightness_step: Tables are made for brightnesses that differ by this factor.
         outline_step: Distance between the columns and rows looked at for the carpet's outline [px].
@@ -89,7 +95,7 @@ class SegmentationParameters:
         farthest: Nothing on the ground is looked for beyond this range [m].
     """
 
-    boxes: dict[Colour, ColourBox] = field(default_factory=_boxes)
+    colours: ColourBoxes = ColourBoxes()
     reference_brightness: float = 0.50
     brightness_step: float = 1.25
     outline_step: int = 8
@@ -101,11 +107,8 @@ class SegmentationParameters:
         """Check the values.
 
         Raises:
-            ValueError: if a class has no box or a number is out of range.
+            ValueError: if a number is out of range.
         """
-        missing = [colour.name for colour in Colour if colour not in self.boxes]
-        if missing:
-            raise ValueError(f"boxes lack {', '.join(map(str, missing))}; expected one for each colour class")
         if not 0.0 < self.reference_brightness <= 1.0:
             raise ValueError(f"reference_brightness is {self.reference_brightness}; expected above 0 to 1")
         if self.brightness_step <= 1.0:
@@ -179,7 +182,8 @@ class Segmenter:
     def _make_table(self, brightness: float) -> NDArray[np.uint8]:
         hue, saturation, value = self._cells
         table = np.zeros(32 * 32 * 32, dtype=np.uint8)
-        for colour, box in self._parameters.boxes.items():
+        for colour in Colour:
+            box = self._parameters.colours.of(colour)
             low, high = box.hue
             in_hue = (hue >= low) & (hue <= high) if low <= high else (hue >= low) | (hue <= high)
             # An upper bound of 1 stays: nothing is too bright; a lower bound never asks for more than 0.8.
@@ -207,7 +211,7 @@ class Segmenter:
     def _brightness(self, picture: Picture) -> float:
         """Return the carpet's value over the reference, from every eighth pixel; 1 if there is hardly any green."""
         hsv = cv2.cvtColor(np.ascontiguousarray(picture[::8, ::8]), cv2.COLOR_BGR2HSV).reshape(-1, 3)
-        box = self._parameters.boxes[Colour.GREEN]
+        box = self._parameters.colours.green
         hue = hsv[:, 0].astype(np.float64) * 2.0  # OpenCV keeps hue / 2 in a byte
         green = (hue >= box.hue[0]) & (hue <= box.hue[1]) & (hsv[:, 1] >= 255 * box.saturation[0]) & (hsv[:, 2] >= 20)
         if np.count_nonzero(green) < 0.02 * len(hsv):
@@ -218,17 +222,15 @@ class Segmenter:
         """Return the carpet's upper edge: the hull of the tops of each column's lowest run of carpet.
 
         The carpet is convex, a lens-free picture of it is convex too, and objects that stand on it only take
-        parts away: a run that ends below an object is too low, never too high. So the hull is taken where no lens bends it: on the plane z = 1 of the camera, turned
-        about its optical axis until the horizon is level.
+        parts away: a run that ends below an object is too low, never too high. So the hull is taken where no
+        lens bends it: on the plane z = 1 of the camera, turned about its optical axis until the horizon is level.
         """
         parameters = self._parameters
         step = parameters.outline_step
         coarse = classes[step // 2 :: step, step // 2 :: step]
         rows, columns = coarse.shape
         filled = (coarse & (Colour.GREEN | Colour.WHITE | Colour.ORANGE)) != 0
-        u_grid, v_grid = np.meshgrid(
-            np.arange(columns) * step + step // 2, np.arange(rows) * step + step // 2
-        )
+        u_grid, v_grid = np.meshgrid(np.arange(columns) * step + step // 2, np.arange(rows) * step + step // 2)
         rays = view.lens.ray_table()[v_grid, u_grid].astype(np.float64)
         down = rays @ view.rotation[2]
         lowest = view.height / math.hypot(view.height, parameters.farthest)  # sine of the angle below the horizon
@@ -252,7 +254,7 @@ class Segmenter:
             return np.empty((0, 2))
         across = np.linspace(flat[:, 0].min(), flat[:, 0].max(), 41)
         height = np.interp(across, flat[hull, 0], flat[hull, 1])
-        return _picture_edge(_from_level_plane(view, np.stack([across, height], axis=1)), view)
+        return _picture_edge(_from_level_plane(view, np.stack([across, height], axis=1)), view, 3.0 * step)
 
 
 def patches(mask: Mask, least_area: float, most: int) -> list[tuple[NDArray[np.int32], float]]:
@@ -295,21 +297,21 @@ def _large_parts(filled: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _top_of_lowest_run(filled: NDArray[np.bool_], shortest: int, gap: int) -> NDArray[np.intp]:
-    """Return for each column of (rows, columns) the top row of its lowest run; `rows` where there is none."""
-    rows, columns = filled.shape
-    top = np.full(columns, rows)
-    length = np.zeros(columns, dtype=np.intp)
-    missing = np.zeros(columns, dtype=np.intp)
-    done = np.zeros(columns, dtype=np.bool_)
-    for row in range(rows - 1, -1, -1):
-        here = filled[row] & ~done
-        length += here
-        top = np.where(here, row, top)
-        missing = np.where(here, 0, missing + 1)
-        ended = ~done & (missing > gap) & (length > 0)
-        done |= ended & (length >= shortest)
-        length = np.where(ended & ~done, 0, length)
-    return np.where(length >= shortest, top, rows)
+    """Return for each column of (rows, columns) the top row of its lowest run; `rows` where that is too short.
+
+    Gaps of up to `gap` rows do not end a run.
+    """
+    rows = len(filled)
+    upwards = filled[::-1]
+    start = upwards.argmax(axis=0)
+    row = np.arange(rows)[:, None]
+    hits = np.concatenate([np.zeros((1, filled.shape[1]), dtype=np.intp), np.cumsum(upwards, axis=0)])
+    ahead = np.minimum(np.arange(rows) + gap + 1, rows)
+    empty = hits[ahead] == hits[:-1]  # nothing in this row and the `gap` rows above it
+    ends = empty & (row > start)
+    end = np.where(ends.any(axis=0), ends.argmax(axis=0), rows)
+    enough = upwards.any(axis=0) & (end - start >= shortest)
+    return np.where(enough, rows - end, rows)
 
 
 def _roll(view: View) -> tuple[float, float]:
@@ -348,16 +350,12 @@ def _upper_hull(points: Array) -> NDArray[np.intp]:
     return np.array(chain, dtype=np.intp)
 
 
-def _picture_edge(outline: Array, view: View) -> Array:
-    """Let the outline reach the picture's left and right edge if it comes within a sampling step of them."""
+def _picture_edge(outline: Array, view: View, near: float) -> Array:
+    """Let the outline reach the picture's left and right edge if it comes closer to them than `near` [px]."""
     outline = outline[np.isfinite(outline).all(axis=1)]
     if not len(outline):
         return outline
-    near = 3.0 * 8.0  # [px] columns sampled, three steps
-    ends = []
-    if outline[0, 0] < near:
-        ends.append([[0.0, outline[0, 1]]])
-    ends.append(outline)
-    if outline[-1, 0] > view.lens.width - near:
-        ends.append([[view.lens.width - 1.0, outline[-1, 1]]])
-    return np.concatenate(ends)
+    left, right = outline[:1].copy(), outline[-1:].copy()
+    left[0, 0], right[0, 0] = 0.0, view.lens.width - 1.0
+    at_left, at_right = outline[0, 0] < near, outline[-1, 0] > view.lens.width - near
+    return np.concatenate([left[:at_left], outline, right[:at_right]])

@@ -56,7 +56,7 @@ def find_uprights(mask: Mask, segmentation: Segmentation, view: View, least_area
         view: Of the same picture.
         least_area: Smaller patches are noise [px^2].
     """
-    below = np.where(view.sines < 0.0, mask, 0).astype(np.uint8)
+    below = np.bitwise_and(mask, view.below_horizon)
     found = []
     for points, _ in patches(below, least_area, MOST_CANDIDATES):
         width, height = np.ptp(points, axis=0) + 1
@@ -111,7 +111,7 @@ def _measure(points: NDArray[np.int32], segmentation: Segmentation, view: View) 
     lower = turned[elevations <= low + max(0.66 * (high - low), 2.0 * pixel)]
     left, right = np.percentile(lower, [94.0, 6.0])
     middle = reference + 0.5 * float(left + right)
-    rows, columns = segmentation.classes.shape
+    columns = segmentation.classes.shape[1]
     near_middle = np.abs(turned - (middle - reference)) <= 0.35 * float(left - right) + pixel
     foot = float(elevations[near_middle].min()) - 0.5 * pixel if near_middle.any() else low
     under = np.array([foot - step * pixel for step in (2.0, 3.0, 4.0, 5.0)])

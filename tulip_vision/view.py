@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -84,6 +85,17 @@ class View:
         table = self.lens.ray_table()
         seen: NDArray[np.float32] = table.reshape(-1, 3) @ self.rotation[2].astype(np.float32)
         return seen.reshape(table.shape[:2])
+
+    @cached_property
+    def below_horizon(self) -> Mask:
+        """(height, width) 255 where a pixel looks below the horizon, else 0."""
+        below: Mask = cv2.compare(self.sines, 0.0, cv2.CMP_LT)
+        return below
+
+    @cached_property
+    def lowest_elevation(self) -> float:
+        """Lowest elevation that the lower edge of the picture shows [rad]."""
+        return math.asin(float(np.clip(self.sines[-1].min(), -1.0, 1.0)))
 
     @property
     def height(self) -> float:

@@ -160,9 +160,7 @@ def things(scene: Scene, field: Field, view: View, opponent_half_width: float = 
     def seen(point: Array, own: int | None, margin: float) -> bool:
         if not view.inside(view.pixels(point[None]), margin)[0] or math.hypot(point[0], point[1]) < 0.55:
             return False
-        return all(
-            not _blocks(view.position, point, *solid) for index, solid in enumerate(solids) if index != own
-        )
+        return all(not _blocks(view.position, point, *solid) for index, solid in enumerate(solids) if index != own)
 
     kinds = {"L": FeatureClass.CROSSING_L, "T": FeatureClass.CROSSING_T, "X": FeatureClass.CROSSING_X}
     found: dict[str, list[Thing]] = {name: [] for name in GROUPS}

@@ -1,0 +1,55 @@
+"""Measure: run a bench, keep its figures and write docs/results.md anew."""
+
+from __future__ import annotations
+
+import _environment
+
+if __name__ == "__main__":
+    _environment.prepare()
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markdown import Markdown
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from tulip_ros.errors import EXIT_BAD_INPUT
+from tulip_sim.bench import kick, trial, walk
+from tulip_sim.bench.runner import Row, run, save, write_results
+
+BENCHES = {module.BENCH.name: module.BENCH for module in (trial, walk, kick)}
+DOCS = _environment.ROOT / "docs"
+
+
+def main(
+    name: Annotated[str, typer.Argument(help=f"One of {', '.join(BENCHES)}.")],
+    workers: Annotated[int | None, typer.Option(help="Processes; all cores by default.", min=1)] = None,
+    json_path: Annotated[Path | None, typer.Option("--json", help="Write the rows to this file, too.")] = None,
+) -> None:
+    """Run a bench."""
+    if name not in BENCHES:
+        print(f"error: bench is {name!r}; expected one of {', '.join(BENCHES)}.", file=sys.stderr)
+        raise typer.Exit(EXIT_BAD_INPUT)
+    bench, console = BENCHES[name], Console()
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task(name, total=len(bench.trials))
+
+        def done(row: Row) -> None:
+            bar.advance(task)
+            console.print("  ".join(f"{key} {value}" for key, value in row.items()), highlight=False, soft_wrap=True)
+
+        rows = run(bench, workers, done)
+    save(bench, rows, DOCS / "results")
+    write_results(list(BENCHES.values()), DOCS / "results", DOCS / "results.md")
+    if json_path is not None:
+        json_path.write_text(json.dumps(rows, indent=1) + "\n")
+    console.print(Markdown("\n".join(bench.summarize(rows))))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,30 @@
+"""What all tests share."""
+
+from __future__ import annotations
+
+import os
+import socket
+
+import pytest
+
+DOMAINS = 102  # above 101 the ports collide with those that the system gives out
+
+
+def _is_free(domain: int) -> bool:
+    """Return whether no first participant listens in a ROS domain (its port follows from the DDS standard)."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("", 7410 + 250 * domain))
+        except OSError:
+            return False
+    return True
+
+
+@pytest.fixture
+def ros_domain(monkeypatch: pytest.MonkeyPatch) -> int:
+    """A ROS domain that nobody uses, set for this process and its children; traffic stays on this machine."""
+    first = int(os.environ.get("ROS_DOMAIN_ID", os.getpid() % DOMAINS))
+    domain = next(each % DOMAINS for each in range(first, first + DOMAINS) if _is_free(each % DOMAINS))
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    return domain

@@ -1,0 +1,66 @@
+"""The graph as declared."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+from tulip_ros import topics
+from tulip_ros.nodes import DRIVERS, NODES, ROBOT
+
+NAME = re.compile(r"[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*")
+
+
+def test_names_are_relative_and_unique():
+    names = [topic.name for topic in topics.TOPICS] + [service.name for service in topics.SERVICES]
+    assert len(set(names)) == len(names)
+    assert [name for name in names if not NAME.fullmatch(name)] == ["/clock"]
+
+
+def test_every_constant_is_in_the_list():
+    declared = {value.name for value in vars(topics).values() if isinstance(value, topics.Topic)}
+    assert declared == {topic.name for topic in topics.TOPICS}
+    served = {value.name for value in vars(topics).values() if isinstance(value, topics.Service)}
+    assert served == {service.name for service in topics.SERVICES}
+
+
+def test_publishers_and_subscribers_are_nodes():
+    known = {*NODES, *(entry.name for entry in DRIVERS.values())}
+    for topic in topics.TOPICS:
+        assert set(topic.publishers) | set(topic.subscribers) <= known, topic.name
+    assert {service.server for service in topics.SERVICES} <= known
+    assert {*ROBOT, "driver"} == set(topics.ALL_NODES)
+
+
+def test_no_playing_node_listens_to_the_ground_truth():
+    listeners = {name for name, entry in NODES.items() if entry.playing} & set(topics.GROUND_TRUTH.subscribers)
+    assert listeners == set()
+    assert topics.GROUND_TRUTH.publishers == ("driver",)
+
+
+def test_every_playing_node_hears_and_says_something():
+    for name in ROBOT:
+        said = {topic.name for topic in topics.published_by(name)} - {"diagnostics"}
+        assert said, name
+    hearing = {name for name in ROBOT if {topic.name for topic in topics.heard_by(name)} - {"/clock"}}
+    assert set(ROBOT) - hearing == {"game_input", "user_input"}  # these hear the network and the user
+
+
+def test_table_has_a_line_for_each_topic_and_service():
+    table = topics.markdown_tables()
+    for each in (*topics.TOPICS, *topics.SERVICES):
+        assert table.count(f"| `{each.name}` | {each.type_name} |") == 1
+
+
+def test_latched_profile_keeps_the_last_message_for_late_listeners():
+    profile = topics.LATCHED.profile()
+    assert (profile.depth, profile.durability.name, profile.reliability.name) == (1, "TRANSIENT_LOCAL", "RELIABLE")
+    assert topics.CONTROL.profile().durability.name == "VOLATILE"
+
+
+def test_no_playing_nodes_program_mentions_the_ground_truth():
+    for name in ROBOT:
+        spec = importlib.util.find_spec(NODES[name].module)
+        assert spec is not None and spec.origin is not None, f"node {name} has no module {NODES[name].module}"
+        assert "ground_truth" not in Path(spec.origin).read_text().lower(), name

@@ -1,0 +1,1 @@
+"""Measurements whose figures are published in docs/results.md: one file a bench."""
