@@ -49,6 +49,7 @@ OTHER_ENVIRONMENTS = (
     "COLCON_PREFIX_PATH",
 )
 
+LAST = 3000  # characters of a failed step's output in which the failure itself is
 INTERFACE_FILES = (".msg", ".srv", ".action", ".txt", ".xml")
 
 NO_NETWORK = re.compile(
@@ -358,7 +359,7 @@ def explain(output: str) -> str:
             f"The disk is full. Make room at {ROOT} and in the folder for temporary files ({SPACE / 2**30:.0f} GiB), "
             "then start again."
         )
-    if NO_NETWORK.search(output):
+    if NO_NETWORK.search(output if missing else output[-LAST:]):  # pip may have got over an early one
         return (
             "The package registry cannot be reached. Check the network (or the proxy, or pip's settings), "
             "then start again."

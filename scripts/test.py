@@ -47,6 +47,7 @@ def test_variables() -> dict[str, str]:
     variables = dict(os.environ)
     variables["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     variables["ROS_DOMAIN_ID"] = str(os.getpid() % 102)  # above 101 the ports collide with the system's own
+    variables.setdefault("ROS_LOG_DIR", str(_environment.ROOT / "build" / "ros_log"))
     for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         variables.setdefault(threads, "1")  # small matrices: more threads only wait for each other
     return variables

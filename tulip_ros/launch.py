@@ -130,6 +130,7 @@ class _Process:
         with open(self._log, "ab") as log:
             self._process = subprocess.Popen(
                 self._command,
+                env={"ROS_LOG_DIR": str(self._log.parent), **os.environ, "PYTHONUNBUFFERED": "1"},
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,

@@ -254,5 +254,9 @@ def markdown_graph() -> str:
     edges.setdefault(("strategy", KICK.server), []).append(f"{KICK.name} (action)")
     for (sender, listener), names in edges.items():
         lines.append(f'    {sender} -->|"{"<br/>".join(names)}"| {listener}')
-    lines += ['    referee(["referee program"]) -->|"UDP"| game_input', '    person(["menu, tools"]) --> user_input', "```"]
+    lines += [
+        '    referee(["referee program"]) -->|"UDP"| game_input',
+        '    person(["menu, tools"]) --> user_input',
+        "```",
+    ]
     return "\n".join(lines) + "\n"

@@ -8,6 +8,7 @@ filtered like a grey picture, at a third of the cost of three channels.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from tulip_description.field import Field
 
 Bytes = NDArray[np.uint8]
+Place = Callable[[float, float], tuple[int, int]]
 
 FLOOR, CARPET, LINE = 40, 120, 255  # indices of the mean floor, the mean carpet and of fresh line paint
 FLOOR_SPREAD, CARPET_SPREAD = 30, 26  # indices around the mean that are still floor, or still carpet
@@ -61,7 +63,8 @@ def paint_ground(field: Field, mottling: float, rng: np.random.Generator) -> Gro
 
     picture = FLOOR + FLOOR_SPREAD * _blotches(rows, columns, (96, 384), rng)
     carpet = np.zeros((rows, columns), np.uint8)
-    _rectangle(carpet, pixel, field.carpet_length / 2.0, field.carpet_width / 2.0)
+    edge = (field.carpet_length / 2.0, field.carpet_width / 2.0)
+    _bar(carpet, pixel, (-edge[0], -edge[1]), edge)
     weave = CARPET + CARPET_SPREAD * mottling * _blotches(rows, columns, (4, 24, 200), rng)
     picture = np.where(carpet > 0, weave, picture).round().astype(np.uint8)
     paint = np.zeros((rows, columns), np.uint8)
@@ -115,7 +118,7 @@ def paint_wall(circumference: float, height: float, resolution: float, rng: np.r
         rng: Where the clutter comes from.
 
     Returns:
-        (rows, columns + 1, 3) BGR; the last column repeats the first, so that the picture closes round the hall.
+        (rows, columns, 3) BGR; the last column is followed by the first.
     """
     columns, rows = round(circumference / resolution), round(height / resolution)
     picture = np.empty((rows, columns, 3), np.float32)
@@ -124,12 +127,12 @@ def paint_wall(circumference: float, height: float, resolution: float, rng: np.r
     picture[ceiling:] = (70, 72, 76)
     for _ in range(60):  # panels
         start, wide = int(rng.integers(columns)), int(rng.integers(20, 90))
-        picture[:ceiling, start : start + wide] += rng.normal(0.0, 9.0, 3)
+        picture[:ceiling, start : start + wide] += rng.normal(0.0, 12.0) + rng.normal(0.0, 4.0, 3)
     for _ in range(90):  # spectators, tables, boxes: mostly grey and brown, some with a little colour
         start, wide = int(rng.integers(columns)), int(rng.integers(8, 40))
         bottom = int(rng.integers(0, rows // 12))
         top = bottom + int(rng.integers(10, 60))
-        colour = rng.uniform(30.0, 150.0) + rng.normal(0.0, 16.0, 3)
+        colour = rng.uniform(30.0, 150.0) + rng.normal(0.0, 14.0, 3)
         picture[bottom:top, start : start + wide] = colour
         if rng.random() < 0.4:  # a head on it
             cv2.circle(picture, (start + wide // 2, top + 5), 5, (95.0, 120.0, 165.0), -1)
@@ -137,18 +140,14 @@ def paint_wall(circumference: float, height: float, resolution: float, rng: np.r
         picture[ceiling + 20 : ceiling + 24, start : start + 60] = (235, 240, 240)
     picture = np.asarray(cv2.GaussianBlur(picture, (0, 0), 1.5, borderType=cv2.BORDER_REPLICATE), np.float32)
     picture *= 1.0 + 0.05 * _blotches(rows, columns, (12, 80), rng)[..., None]
-    closed = np.concatenate([picture, picture[:, :1]], axis=1)
-    return np.ascontiguousarray(np.clip(closed, 0, 255).astype(np.uint8))
+    return np.ascontiguousarray(np.clip(picture, 0, 255).astype(np.uint8))
 
 
-def _bar(paint: Bytes, pixel, low: tuple[float, float], high: tuple[float, float]) -> None:  # type: ignore[no-untyped-def]
+def _bar(paint: Bytes, pixel: Place, low: tuple[float, float], high: tuple[float, float]) -> None:
+    """Fill a rectangle between two places in map; pixel gives their columns and rows with SHIFT fractional bits."""
     (x0, y0), (x1, y1) = pixel(*low), pixel(*high)
     whole = 1 << SHIFT
     paint[-(-y0 // whole) : y1 // whole + 1, -(-x0 // whole) : x1 // whole + 1] = 255
-
-
-def _rectangle(paint: Bytes, pixel, half_length: float, half_width: float) -> None:  # type: ignore[no-untyped-def]
-    _bar(paint, pixel, (-half_length, -half_width), (half_length, half_width))
 
 
 def _blotches(rows: int, columns: int, sizes: tuple[int, ...], rng: np.random.Generator) -> NDArray[np.float32]:

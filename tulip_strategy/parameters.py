@@ -56,10 +56,12 @@ class StrategyParameters:
     kick_ahead_window: float = 0.03  # [m] aligned within this, stepping
     kick_lateral_window: float = 0.03  # [m]
     kick_heading_window: float = 0.15  # [rad] the foot's direction makes up for the rest
+    kick_gap_share: float = 0.3  # of the free gap: near the goal the gap is wide, and the heading may err as much
     kick_window_growth: float = 1.6  # windows grow to this times their size while lining up takes long
     kick_patience: float = 10.0  # [s] of lining up that double the windows
     kick_settle_growth: float = 1.9  # windows are this much wider once standing, so that it does not chatter
     kick_wait_ahead: float = 0.47  # [m] distance kept from the ball until the robot is lined up sideways
+    kick_approach_gain: float = 0.6  # [1/s] speed per distance before that; higher, the legs overshoot into the ball
     kick_align_speed: float = 0.12  # [m/s] small steps next to the ball
     kick_settle_time: float = 0.4  # [s] stand this long: the last step and the ball's estimate die down
     kick_settle_limit: float = 2.5  # [s] stop waiting for motion control to report that it stands
@@ -75,12 +77,14 @@ class StrategyParameters:
 
     # Aim.
     opponent_radius: float = 0.30  # [m] keeper's half width and a step to the side
-    aim_time: float = 1.2  # [s] smoothing of the aim point: estimates of keeper and pose jitter
+    aim_time: float = 2.0  # [s] smoothing of the aim point: estimates of keeper and pose jitter
+    aim_jump: float = 2.0  # [m] of the aim point in odom: localization found its place anew, so it is taken at once
     gap_preference: float = 1.25  # another gap has to be this much wider to change the side
 
     # Ball lost and found.
     ball_lost_age: float = 3.0  # [s] unseen: longer than a glance and the time a ball at the feet may be hidden
     ball_found_age: float = 0.5  # [s] seen again
+    ball_gone_time: float = 1.0  # [s] without any estimate: bridges one that is dropped and made again
     ball_confidence: float = 0.25  # below this it may be a false sighting
     look_back_time: float = 1.5  # [s] look where it was
     sweep_time: float = 7.0  # [s] one whole sweep of the head, far and near

@@ -120,7 +120,7 @@ def _draw(drawn: NDArray[np.uint8], feature: Feature, view: View) -> None:
 def _polyline(drawn: NDArray[np.uint8], points: Array, colour: Colour) -> None:
     """Draw the parts of a polyline whose points are in front of the camera."""
     with np.errstate(invalid="ignore"):
-        good: NDArray[np.bool_] = (np.abs(points) < 10_000.0).all(axis=1)  # NaN is not
+        good = np.abs(points).max(axis=1) < 10_000.0  # NaN is not
     for index in np.flatnonzero(good[:-1] & good[1:]):
         first, second = np.rint(points[index]).astype(int), np.rint(points[index + 1]).astype(int)
         cv2.line(drawn, (int(first[0]), int(first[1])), (int(second[0]), int(second[1])), colour, 1, cv2.LINE_AA)

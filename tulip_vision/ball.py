@@ -162,10 +162,10 @@ def _fit_cone(start: Array, rays: Array, pixel: float) -> tuple[Array, float, fl
         length = float(np.linalg.norm(solution))
         if rank < 3 or length <= 1.0:
             return None
-        axis, radius = solution / length, math.acos(1.0 / length)
+        axis = np.asarray(solution / length, dtype=np.float64)
+        radius = math.acos(1.0 / length)
         residuals = np.abs(np.arccos(np.clip(rays @ axis, -1.0, 1.0)) - radius)
         kept = rays[residuals <= max(1.5 * pixel, 2.5 * float(np.median(residuals)))]
-    axis = axis.astype(np.float64)
     return axis, radius, float(np.sqrt(np.mean(np.sort(residuals)[: max(len(kept), 1)] ** 2))), len(kept)
 
 

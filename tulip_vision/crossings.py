@@ -23,6 +23,10 @@ ARMS = np.array([0.13, 0.17, 0.21, 0.25, 0.29, 0.33])
 """[m] Where an arm is looked at: beyond the width of the other line, before the next line of the field begins."""
 LEAST_MARK_AREA = 8.0
 """[px^2] at 4 m the penalty mark covers about 12."""
+BODY_HALF_WIDTH = 0.25
+"""[m] of an opponent; its light parts look like paint."""
+FOOT_RADIUS = 0.25
+"""[m] around the foot of a goal post: no line of the field meets the goal line there."""
 MOST_MARK_CANDIDATES = 20
 """The largest white patches are looked at."""
 
@@ -82,8 +86,24 @@ class _Place:
         return np.stack([*straight, *bent])
 
 
-def find_crossings(lines: Lines, segmentation: Segmentation, view: View, parameters: CrossingParameters) -> Findings:
-    """Return the crossings of the lines in the picture."""
+def find_crossings(
+    lines: Lines,
+    opponents: Findings,
+    goal_posts: Findings,
+    segmentation: Segmentation,
+    view: View,
+    parameters: CrossingParameters,
+) -> Findings:
+    """Return the crossings of the lines in the picture.
+
+    Args:
+        lines: Pieces of line and the centre circle.
+        opponents: Of the same picture: what seems to cross on a body does not.
+        goal_posts: Of the same picture: the net begins at their feet and looks like a line there.
+        segmentation: Of the same picture.
+        view: Of the same picture.
+        parameters: How crossings are found.
+    """
     places = _proposals(lines, view, parameters)
     if not places:
         return Findings()
@@ -100,6 +120,10 @@ def find_crossings(lines: Lines, segmentation: Segmentation, view: View, paramet
             if np.isfinite(pixel).all():
                 refusals.append(Refusal(FeatureClass.CROSSING_L, (float(pixel[0]), float(pixel[1])), reason))
             continue
+        if any(_behind(place.point, opponent, view) for opponent in opponents.features):
+            continue
+        if any(_at_foot(place.point, post, view) for post in goal_posts.features):
+            continue
         taken.append(place.point)
         features.append(_feature(kind, place.point, confidence, view))
     return Findings(tuple(features), tuple(refusals))
@@ -109,7 +133,8 @@ def find_penalty_marks(
     lines: Lines, segmentation: Segmentation, view: View, parameters: CrossingParameters
 ) -> Findings:
     """Return white spots on the carpet that have the penalty mark's size and stand alone."""
-    level = 0.5 * (_carpet_whiteness(segmentation) + 255.0 * min(1.0, 0.75 * segmentation.brightness))
+    carpet_level = _carpet_whiteness(segmentation)
+    level = 0.5 * (carpet_level + 255.0 * min(1.0, 0.75 * segmentation.brightness))
     lowest = -view.height / math.hypot(view.height, parameters.mark_range)
     close = np.flatnonzero(view.sines[:, view.lens.width // 2] < lowest)
     if not len(close):
@@ -128,17 +153,42 @@ def find_penalty_marks(
         extent = 2.0 * np.linalg.norm(ground - centre, axis=1).max()
         if not 0.6 * parameters.mark_size <= extent <= 1.9 * parameters.mark_size:
             continue
-        turn = np.linspace(0.0, 2.0 * math.pi, 16, endpoint=False)
-        ring = centre + 1.6 * parameters.mark_size * np.column_stack([np.cos(turn), np.sin(turn)])
-        classes, inside = view.sample(segmentation.classes, view.pixels_on_ground(ring))
-        carpet = float(((classes & Colour.GREEN) != 0)[inside].mean()) if inside.any() else 0.0
+        turn = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
+        circle = np.column_stack([np.cos(turn), np.sin(turn)])
+        ring = np.concatenate([centre + share * parameters.mark_size * circle for share in (1.6, 2.2)])
+        around = view.pixels_on_ground(ring)
+        classes, inside = view.sample(segmentation.classes, around)
+        whiteness, _ = view.sample(segmentation.whiteness, around)
+        # Far away a thin line through the spot is a blend that still counts as green: look at its brightness too.
+        plain = ((classes & Colour.GREEN) != 0) & (whiteness < carpet_level + 0.4 * (level - carpet_level))
+        carpet = float(plain[inside].mean()) if inside.any() else 0.0
         own = abs(centre[0]) < 0.35 and abs(centre[1]) < 0.3
-        if carpet < 0.9 or own or any(_distance(centre, piece.start, piece.end) < 0.15 for piece in lines.pieces):
+        if carpet < 0.95 or own or any(_distance(centre, piece.start, piece.end) < 0.15 for piece in lines.pieces):
             u, v = points.mean(axis=0)
             refusals.append(Refusal(FeatureClass.PENALTY_MARK, (float(u), float(v) + top), "does not stand alone"))
             continue
         features.append(_feature(FeatureClass.PENALTY_MARK, centre, 0.6, view))
     return Findings(tuple(features), tuple(refusals))
+
+
+def _behind(point: Array, opponent: Feature, view: View) -> bool:
+    """Return whether a point on the ground is seen where an opponent's body is."""
+    if math.isnan(opponent.elevation):
+        return False
+    offset = point - view.position[:2]
+    azimuth, distance = math.atan2(float(offset[1]), float(offset[0])), float(np.linalg.norm(offset))
+    apart = abs((azimuth - opponent.azimuth + math.pi) % (2.0 * math.pi) - math.pi)
+    body = view.height / math.tan(-opponent.elevation)
+    return apart < BODY_HALF_WIDTH / body and distance > body - BODY_HALF_WIDTH
+
+
+def _at_foot(point: Array, post: Feature, view: View) -> bool:
+    """Return whether a point on the ground is at a goal post's foot."""
+    if math.isnan(post.elevation):
+        return False
+    distance = view.height / math.tan(-post.elevation)
+    foot = view.position[:2] + distance * np.array([math.cos(post.azimuth), math.sin(post.azimuth)])
+    return float(np.linalg.norm(point - foot)) < FOOT_RADIUS + 0.05 * distance
 
 
 def _proposals(lines: Lines, view: View, parameters: CrossingParameters) -> list[_Place]:

@@ -88,10 +88,12 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
             return f"{upright.width * distance:.2f} m wide"
         heights = np.linspace(0.15, parameters.height - 0.15, 18)
         along = axis_samples(view, segmentation.classes, foot, heights)
-        yellow = float(((along & Colour.YELLOW) != 0).mean()) if len(along) else 0.0
+        if len(along) < 3:
+            return "too little of it in the picture"  # the lowest segment of a pole would look the same
+        yellow = float(((along & Colour.YELLOW) != 0).mean())
         if yellow < parameters.least_yellow:
             return f"only {yellow:.0%} of the axis is yellow"
-        if len(along) and float(((along & Colour.BLUE) != 0).mean()) > 0.12:
+        if float(((along & Colour.BLUE) != 0).mean()) > 0.12:
             return "blue above it: a pole"
         bar = _crossbar(segmentation, view, foot, parameters)
         direction = direction_of(upright.azimuth, elevation)
@@ -100,6 +102,8 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
         return Feature(FeatureClass.GOAL_POST, upright.azimuth, elevation, azimuth_spread, elevation_spread, confidence)
     if upright.foot_seen:
         return f"foot {distance:.1f} m away"
+    if not upright.on_carpet:
+        return "not on the carpet"
     if not upright.reaches_up:
         return "no carpet below, and it ends below the horizon"
     if upright.cut:

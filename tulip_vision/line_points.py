@@ -19,6 +19,12 @@ from tulip_vision.view import Array, View
 
 LONGEST_REACH = 60
 """[px] lines at the robot's own feet are not looked for beyond that."""
+SLANTED = 1.6
+"""Thickness of a line that runs at up to 50 deg to its cut, over that of one at a right angle."""
+MARGIN = 2.0
+"""[px] blur on both sides."""
+SLIMMEST = 0.25
+"""Least thickness of a line over the largest: less than half of what is expected at a right angle."""
 
 
 @dataclass(frozen=True)
@@ -148,8 +154,7 @@ def _expected_widths(view: View, parameters: LinePointParameters) -> tuple[Array
     focal = float(view.lens.camera_matrix[1, 1])
     wide = parameters.line_width * focal / slant
     deep = wide * view.height / slant
-    # 1.6: lines at up to 50 deg to the cut; 2 px: blur on both sides.
-    return 1.6 * deep + 2.0, 1.6 * wide + 2.0, slant
+    return SLANTED * deep + MARGIN, SLANTED * wide + MARGIN, slant
 
 
 def _contrast(slant: Array, brightness: float, view: View, parameters: LinePointParameters) -> NDArray[np.uint8]:
@@ -181,7 +186,9 @@ def _runs(
     start, end = np.flatnonzero(change > 0), np.flatnonzero(change < 0)  # in a row of length + 1
     cut = start // (length + 1)
     start, end = start % (length + 1), end % (length + 1)
-    thin = (end - start <= 2 * reach[cut, (start + end) // 2]) & (start > 0) & (end < length)
+    expected = reach[cut, (start + end) // 2]
+    thin = (end - start <= 2 * expected) & (start > 0) & (end < length)
+    thin &= end - start >= SLIMMEST * (expected - MARGIN)  # threads of a net are white too
     cut, start, end = cut[thin], start[thin], end[thin]
     middle = 0.5 * (start + end - 1)
     short = np.flatnonzero(end - start <= 10)

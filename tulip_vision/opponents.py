@@ -37,16 +37,19 @@ class OpponentParameters:
         team_colour: Of our own team: "cyan" or "magenta"; opponents wear the other.
         least_area: Smallest marker patch looked at [px^2].
         lowest_marker, highest_marker: Height of markers above the ground [m].
+        smallest_marker, largest_marker: Area of one marker, as seen [m^2].
         half_width: Of a body [m].
         depth: From the near edge of the feet to the point below the body [m].
         depth_spread: Standard deviation of that depth [m].
         farthest: Largest distance along the ground [m].
     """
 
-    team_colour: str = "magenta"
+    team_colour: str = "cyan"
     least_area: float = 10.0  # [px^2] at 9 m a marker of 0.18 m is 9 px wide
     lowest_marker: float = 0.15
-    highest_marker: float = 1.4
+    highest_marker: float = 1.25
+    smallest_marker: float = 0.004  # [m^2] an arm's marker seen from the front, half hidden
+    largest_marker: float = 0.25  # [m^2]
     half_width: float = 0.30
     depth: float = 0.10
     depth_spread: float = 0.07  # [m] feet of 0.2 m seen from any side
@@ -66,6 +69,10 @@ class OpponentParameters:
         if not 0.0 <= self.lowest_marker < self.highest_marker:
             raise ValueError(
                 f"markers from {self.lowest_marker} m to {self.highest_marker} m; expected 0 <= lowest < highest"
+            )
+        if not 0.0 <= self.smallest_marker < self.largest_marker:
+            raise ValueError(
+                f"markers of {self.smallest_marker} to {self.largest_marker} m^2; expected 0 <= smallest < largest"
             )
         if self.depth < 0.0 or self.depth_spread < 0.0:
             raise ValueError(f"depth is {self.depth} m, depth_spread {self.depth_spread} m; expected >= 0 m")
@@ -155,6 +162,9 @@ def _examine(
         return f"marker {marker_height:.2f} m above the ground"
     if _painted(marker, low, segmentation, view) > 0.25:
         return "yellow or blue below the marker: a pole"
+    area = marker.area * (pixel * math.hypot(distance, view.height)) ** 2
+    if not parameters.smallest_marker <= area <= parameters.largest_marker:
+        return f"marker of {area:.3f} m^2"
     marker = _joined(marker, markers, 1.2 * parameters.half_width / distance)
     azimuth = _middle(marker, low, distance, segmentation, view, parameters)
     elevation = -math.atan2(view.height, distance + parameters.depth)
@@ -220,7 +230,8 @@ def _contact(marker: _Marker, half: float, segmentation: Segmentation, view: Vie
     classes, inside = view.sample(segmentation.classes, pixels)
     shape = (len(elevations), len(azimuths))
     on_carpet, _ = view.sample(segmentation.on_carpet, pixels)
-    carpet = (((classes & CARPET) != 0) & (on_carpet != 0)).reshape(shape)
+    # A ball at the feet is no part of the body.
+    carpet = (((classes & (CARPET | Colour.ORANGE)) != 0) & (on_carpet != 0)).reshape(shape)
     seen = inside.reshape(shape)
     # The carpet begins where three samples in a row are carpet; a single one is noise.
     begins = carpet[:-2] & carpet[1:-1] & carpet[2:]
@@ -228,7 +239,7 @@ def _contact(marker: _Marker, half: float, segmentation: Segmentation, view: Vie
     first = begins.argmax(axis=0)
     starts_on_body = ~carpet[0] & seen[0]
     # A body hides carpet: above its foot the picture shows something else inside the carpet's outline.
-    painted = (classes & (Colour.ORANGE | Colour.YELLOW | Colour.BLUE)) != 0
+    painted = (classes & (Colour.YELLOW | Colour.BLUE)) != 0
     hides = ~carpet & (on_carpet != 0).reshape(shape) & ~painted.reshape(shape)
     hidden = np.array([np.count_nonzero(hides[: first[column], column]) for column in range(len(azimuths))])
     standing = has & starts_on_body & (hidden >= 2)

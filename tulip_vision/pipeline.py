@@ -107,9 +107,9 @@ def stages(parameters: VisionParameters) -> tuple[Stage, ...]:
         Stage("join lines", ("line_points", "view"), "lines", lambda q, v: find_lines(q, v, p.lines)),
         Stage(
             "find crossings",
-            ("lines", *seen),
+            ("lines", "opponents", "goal_posts", *seen),
             "crossings",
-            lambda lines, s, v: find_crossings(lines, s, v, p.crossings),
+            lambda lines, o, g, s, v: find_crossings(lines, o, g, s, v, p.crossings),
         ),
         Stage(
             "find penalty marks",

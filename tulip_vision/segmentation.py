@@ -66,7 +66,7 @@ class ColourBoxes:
     """The box of each colour class: hues of the rules of 2013, widened to what pictures of that time show."""
 
     green: ColourBox = ColourBox((68.0, 170.0), (0.25, 1.0), (0.12, 1.0))  # 68: yellowish carpets
-    white: ColourBox = ColourBox((0.0, 360.0), (0.0, 0.28), (0.55, 1.0))
+    white: ColourBox = ColourBox((0.0, 360.0), (0.0, 0.28), (0.64, 1.0))  # a grey floor is at 0.5
     orange: ColourBox = ColourBox((350.0, 38.0), (0.52, 1.0), (0.28, 1.0))
     yellow: ColourBox = ColourBox((41.0, 66.0), (0.42, 1.0), (0.30, 1.0))
     blue: ColourBox = ColourBox((204.0, 250.0), (0.45, 1.0), (0.18, 1.0))
@@ -229,13 +229,19 @@ class Segmenter:
         step = parameters.outline_step
         coarse = classes[step // 2 :: step, step // 2 :: step]
         rows, columns = coarse.shape
-        filled = (coarse & (Colour.GREEN | Colour.WHITE | Colour.ORANGE)) != 0
+        green = (coarse & (Colour.GREEN | Colour.ORANGE)) != 0
         u_grid, v_grid = np.meshgrid(np.arange(columns) * step + step // 2, np.arange(rows) * step + step // 2)
         rays = view.lens.ray_table()[v_grid, u_grid].astype(np.float64)
         down = rays @ view.rotation[2]
         lowest = view.height / math.hypot(view.height, parameters.farthest)  # sine of the angle below the horizon
-        usable = _large_parts(filled & (down < -lowest))
-        row = _top_of_lowest_run(usable, parameters.outline_run, parameters.outline_gap)
+        below = down < -lowest
+        # Thick lines divide runs, so white is part of them; but a grey floor counts as white now and then, and so
+        # white joins no parts, and the carpet's edge itself is green.
+        carpet = _large_parts(green & below)
+        filled = carpet | (((coarse & Colour.WHITE) != 0) & below)
+        row = _top_of_lowest_run(filled, parameters.outline_run, parameters.outline_gap)
+        carpet &= np.arange(rows)[:, None] >= row
+        row = np.where(carpet.any(axis=0), carpet.argmax(axis=0), rows)
         column = np.flatnonzero(row < rows)
         if len(column) < 3:
             return np.empty((0, 2))
@@ -357,5 +363,5 @@ def _picture_edge(outline: Array, view: View, near: float) -> Array:
         return outline
     left, right = outline[:1].copy(), outline[-1:].copy()
     left[0, 0], right[0, 0] = 0.0, view.lens.width - 1.0
-    at_left, at_right = outline[0, 0] < near, outline[-1, 0] > view.lens.width - near
+    at_left, at_right = int(outline[0, 0] < near), int(outline[-1, 0] > view.lens.width - near)
     return np.concatenate([left[:at_left], outline, right[:at_right]])

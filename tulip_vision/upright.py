@@ -26,6 +26,7 @@ class Upright:
         width: Angle between its left and right edge [rad].
         low, high: Elevation of its lowest and highest point [rad].
         foot_seen: True where carpet is seen right below it.
+        on_carpet: True where its lowest point is inside the carpet's outline or at the lower edge of the picture.
         cut: True where the left or right edge of the picture cuts it.
         reaches_up: True where it goes on to the horizon or the upper edge of the picture.
         pixel: u, v of its lowest point.
@@ -37,6 +38,7 @@ class Upright:
     low: float
     high: float
     foot_seen: bool
+    on_carpet: bool
     cut: bool
     reaches_up: bool
     pixel: tuple[float, float]
@@ -111,7 +113,7 @@ def _measure(points: NDArray[np.int32], segmentation: Segmentation, view: View) 
     lower = turned[elevations <= low + max(0.66 * (high - low), 2.0 * pixel)]
     left, right = np.percentile(lower, [94.0, 6.0])
     middle = reference + 0.5 * float(left + right)
-    columns = segmentation.classes.shape[1]
+    rows, columns = segmentation.classes.shape
     near_middle = np.abs(turned - (middle - reference)) <= 0.35 * float(left - right) + pixel
     foot = float(elevations[near_middle].min()) - 0.5 * pixel if near_middle.any() else low
     under = np.array([foot - step * pixel for step in (2.0, 3.0, 4.0, 5.0)])
@@ -119,15 +121,16 @@ def _measure(points: NDArray[np.int32], segmentation: Segmentation, view: View) 
     classes, inside = view.sample(segmentation.classes, view.pixels_of_directions(directions))
     carpet, _ = view.sample(segmentation.on_carpet, view.pixels_of_directions(directions))
     ground = ((classes & (Colour.GREEN | Colour.WHITE)) != 0) & (carpet != 0) & inside
-    top = points[highest]
+    top, bottom = points[highest], points[lowest]
     return Upright(
         azimuth=(middle + math.pi) % (2.0 * math.pi) - math.pi,
         width=float(left - right) + pixel,
         low=foot,
         high=high,
         foot_seen=int(ground.sum()) >= 3,
+        on_carpet=bool(bottom[1] >= rows - 2 or segmentation.on_carpet[bottom[1], bottom[0]] != 0),
         cut=bool(points[:, 0].min() <= 0 or points[:, 0].max() >= columns - 1),
         reaches_up=bool(high > -4.0 * pixel or top[1] <= 1),
-        pixel=(float(points[lowest, 0]), float(points[lowest, 1])),
+        pixel=(float(bottom[0]), float(bottom[1])),
         pixel_angle=pixel,
     )

@@ -162,7 +162,9 @@ class View:
         """
         noise = self.spread.pixel * pixels * self.angle_per_pixel(direction)
         level = max(math.hypot(float(direction[0]), float(direction[1])), 0.05)
-        return math.hypot(noise / level, self.spread.pose_azimuth), math.hypot(noise, self.spread.pose_elevation)
+        sideways = self.spread.pose_elevation * abs(float(direction[2])) / level  # a tilt about the line of sight
+        azimuth = math.hypot(noise / level, self.spread.pose_azimuth, sideways)
+        return azimuth, math.hypot(noise, self.spread.pose_elevation)
 
     def inside(self, pixels: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Return (n,) whether (n, 2) pixels lie in the picture, `margin` pixels from its edges."""

@@ -169,6 +169,28 @@ def test_a_ball_seen_again_must_be_fresh() -> None:
     assert "find ball" not in player.tick(ball_at(1.5, 0.0, age=1.0)).tree
 
 
+def test_an_estimate_that_drops_out_for_a_moment_changes_nothing() -> None:
+    player = Player()
+    player.tick(ball_at(1.5, 0.0))
+    gone = player.ticks(PARAMETERS.ball_gone_time - 0.1)
+    assert all("find ball" not in decision.tree for decision in gone)
+    assert "find ball" in player.ticks(0.3)[-1].tree
+
+
+def test_the_aim_does_not_turn_with_a_localization_that_jitters() -> None:
+    """The yaw estimate jumps by 0.1 rad to either side; dead reckoning tells that the robot stands still."""
+    strategy = Strategy(PARAMETERS, FIELD)
+    odom = Pose2D(5.0, 5.0, 2.0) @ ROBOT
+    turning = []
+    for tick in range(100):
+        pose = replace(ROBOT, yaw=ROBOT.yaw + 0.1 * (-1) ** tick)
+        seen = WorldState(tick * TICK, RobotEstimate(pose, np.eye(3) * 0.01, odom), ball_at(0.7, 0.0), (KEEPER,))
+        decision = strategy.decide(tick * TICK, seen, game_state(tick * TICK), PLAY, None)
+        turning.append(decision.walk.velocity[2] / PARAMETERS.heading_gain)
+    assert "attack" in decision.tree
+    assert np.ptp(turning[50:]) < 0.02  # [rad] a tenth of the jitter
+
+
 def kick_place(side: Side) -> ObjectEstimate:
     """The ball before a foot, on the line to the free side of the goal."""
     lateral = PARAMETERS.kick_lateral * (1 if side is Side.LEFT else -1)

@@ -17,6 +17,7 @@ from tulip_description.field import Field
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_description.posture import standing_posture
 from tulip_description.robot import Robot
+from tulip_sim.truth import Truth
 from tulip_vision.features import Feature, FeatureClass, Features
 from tulip_vision.pipeline import Vision
 from tulip_vision.view import View
@@ -102,6 +103,8 @@ RANGES = {"ball": 6.0, "post": 9.0, "pole": 7.0, "opponent": 8.0, "crossing": 5.
 """[m] up to here a thing must be found."""
 MATCH = math.radians(2.0)
 """A feature further than this from everything of its class is false."""
+BODY_MATCH = 0.2
+"""[m] the same for opponents close by, whose middle is a matter of definition."""
 
 
 def random_scenes(count: int, field: Field, robot: Robot, rng: np.random.Generator) -> Iterator[Scene]:
@@ -133,6 +136,30 @@ def random_scenes(count: int, field: Field, robot: Robot, rng: np.random.Generat
             np.array([*ball, field.ball_radius]),
             keeper,
         )
+
+
+def truth_of(scene: Scene) -> Truth:
+    """Return a scene as the renderer takes it: at rest, with poles."""
+    still = np.zeros(3)
+    return Truth(
+        stamp=0,
+        base_position=np.array([scene.footprint.x, scene.footprint.y, scene.height]),
+        base_orientation=scene.orientation,
+        base_linear_velocity=still,
+        base_angular_velocity=still,
+        joint_positions=scene.joints,
+        joint_velocities=np.zeros(len(scene.joints)),
+        ball_position=scene.ball,
+        ball_orientation=np.array([0.0, 0.0, 0.0, 1.0]),
+        ball_linear_velocity=still,
+        ball_angular_velocity=still,
+        keeper=scene.keeper,
+        keeper_path=(),
+        foot_touches=(0, 0),
+        body_touches=0,
+        keeper_touches=0,
+        poles=True,
+    )
 
 
 def camera_pose(scene: Scene, robot: Robot) -> Array:
@@ -179,7 +206,12 @@ def things(scene: Scene, field: Field, view: View, opponent_half_width: float = 
         and math.hypot(keeper[0], keeper[1]) > 0.9,
     )
     for index, post in enumerate(posts):
-        add("post", GROUPS["post"], post, all(seen(post + [0, 0, z], 2 + index, 8.0) for z in (0.0, 0.15, 0.4, 0.8)))
+        add(
+            "post",
+            GROUPS["post"],
+            post,
+            all(seen(post + np.array([0, 0, z]), 2 + index, 8.0) for z in (0.0, 0.15, 0.4, 0.8)),
+        )
     for index, (foot, pole) in enumerate(poles):
         yellow_first = pole.colours[0] == "yellow"
         kind = FeatureClass.POLE_YELLOW_BLUE_YELLOW if yellow_first else FeatureClass.POLE_BLUE_YELLOW_BLUE
@@ -242,7 +274,8 @@ def _compare(
             vertical = 0.0 if math.isnan(each.elevation) else each.elevation - elevation
             return math.hypot(wrap_angle(each.azimuth - azimuth) * math.cos(elevation), vertical)
 
-        fitting = [each for each in left if each.kind in thing.kinds and off(each) < MATCH]
+        match = max(MATCH, BODY_MATCH / thing.distance) if name == "opponent" else MATCH
+        fitting = [each for each in left if each.kind in thing.kinds and off(each) < match]
         tally.there += thing.required
         if not fitting:
             if thing.required:

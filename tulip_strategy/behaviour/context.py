@@ -29,6 +29,7 @@ class BallMemory:
     def __init__(self, parameters: StrategyParameters) -> None:
         self._parameters = parameters
         self._place_in_odom: Point | None = None
+        self._good_stamp = 0  # [ns]
         self.known = False
         self.position: Point | None = None
         self.velocity: Point = (0.0, 0.0)
@@ -38,8 +39,14 @@ class BallMemory:
         ball = world.ball
         odom = world.robot.pose_in_odom
         oldest = self._parameters.ball_lost_age if self.known else self._parameters.ball_found_age
-        self.known = ball is not None and ball.age <= oldest and ball.confidence >= self._parameters.ball_confidence
-        if ball is not None and self.known:
+        good = ball is not None and ball.age <= oldest and ball.confidence >= self._parameters.ball_confidence
+        if good:
+            self._good_stamp = world.stamp
+        # An estimate may drop out for a moment and come again; the place is remembered meanwhile.
+        dropped_out = ball is None or ball.age <= oldest
+        just_now = (world.stamp - self._good_stamp) * 1e-9 <= self._parameters.ball_gone_time
+        self.known = good or (self.known and dropped_out and just_now)
+        if ball is not None and good:
             self._place_in_odom = odom.transform(ball.position)
             self.velocity = (float(ball.velocity[0]), float(ball.velocity[1]))
         else:
@@ -50,6 +57,9 @@ class BallMemory:
 class Aim:
     """Keeps a smooth point to send the ball to.
 
+    The point is smoothed in odom, whose short-term errors are far smaller than those of localization: a pose
+    estimate that jitters would else turn the direction with it.
+
     Attributes:
         direction: From the ball to the point, in base_footprint [rad].
         gap: Free angle round it [rad], 0 without a free gap.
@@ -59,7 +69,7 @@ class Aim:
     def __init__(self, parameters: StrategyParameters, field: Field) -> None:
         self._parameters = parameters
         self._field = field
-        self._across: float | None = None  # where the ball shall cross the goal line, y in map [m]
+        self._point_in_odom: Point | None = None  # on the goal line [m]
         self.direction = 0.0
         self.gap = 0.0
         self.goal_distance = math.inf
@@ -67,7 +77,7 @@ class Aim:
     def update(self, world: WorldState, ball: Point, dt: float) -> None:
         """Choose the gap from where ball and opponents are, relative to the robot, `dt` [s] after the last time."""
         goal = self._field.opponent_goal
-        robot = world.robot.pose
+        robot, odom = world.robot.pose, world.robot.pose_in_odom
         to_robot = robot.inverse()
         left, right = (to_robot.transform((post.x, post.y)) for post in goal.posts)
         middle = to_robot.transform((goal.x, 0.0))
@@ -82,11 +92,13 @@ class Aim:
             self._parameters.opponent_radius,
             self._field.ball_radius,
         )
-        previous = None if self._across is None else self._direction(to_robot, ball, self._across)
+        previous = None if self._point_in_odom is None else self._direction(odom, ball, self._point_in_odom)
         gap = choose_gap(gaps, previous, self._parameters.gap_preference)
         self.gap = 0.0 if gap is None else gap.width
-        self._across = self._smoothed(0.0 if gap is None else self._crossing(robot, ball, gap.middle), dt)
-        self.direction = self._direction(to_robot, ball, self._across)
+        across = 0.0 if gap is None else self._crossing(robot, ball, gap.middle)
+        point = odom.transform(to_robot.transform((goal.x, across)))
+        self._point_in_odom = self._smoothed(point, dt)
+        self.direction = self._direction(odom, ball, self._point_in_odom)
 
     def _crossing(self, robot: Pose2D, ball: Point, direction: float) -> float:
         """Return y in map [m] where a ray from the ball crosses the goal line, kept between the posts."""
@@ -96,13 +108,15 @@ class Aim:
         half = 0.5 * self._field.goal_width - self._field.ball_radius
         return max(-half, min(half, y + slope * (self._field.opponent_goal.x - x)))
 
-    def _smoothed(self, across: float, dt: float) -> float:
-        if self._across is None:
-            return across
-        return self._across + (across - self._across) * (1.0 - math.exp(-dt / self._parameters.aim_time))
+    def _smoothed(self, point: Point, dt: float) -> Point:
+        old = self._point_in_odom
+        if old is None or math.dist(old, point) > self._parameters.aim_jump:
+            return point
+        share = 1.0 - math.exp(-dt / self._parameters.aim_time)
+        return old[0] + share * (point[0] - old[0]), old[1] + share * (point[1] - old[1])
 
-    def _direction(self, to_robot: Pose2D, ball: Point, across: float) -> float:
-        point = to_robot.transform((self._field.opponent_goal.x, across))
+    def _direction(self, odom: Pose2D, ball: Point, point_in_odom: Point) -> float:
+        point = odom.inverse().transform(point_in_odom)
         return math.atan2(point[1] - ball[1], point[0] - ball[0])
 
 

@@ -41,6 +41,12 @@ class Foot:
         return context.parameters.kick_lateral * (1.0 if self.side is Side.LEFT else -1.0)
 
 
+def heading_window(context: Context) -> float:
+    """Return how far the robot may face beside the aim [rad]."""
+    parameters = context.parameters
+    return max(parameters.kick_heading_window, parameters.kick_gap_share * context.aim.gap)
+
+
 def in_kick_window(context: Context, lateral: float, growth: float) -> bool:
     """Tell whether the ball lies before the foot, within the windows times `growth`."""
     parameters, ball = context.parameters, context.ball.position
@@ -49,7 +55,7 @@ def in_kick_window(context: Context, lateral: float, growth: float) -> bool:
     return (
         abs(ball[0] - parameters.kick_ahead) <= growth * parameters.kick_ahead_window
         and abs(ball[1] - lateral) <= growth * parameters.kick_lateral_window
-        and abs(context.aim.direction) <= growth * parameters.kick_heading_window
+        and abs(context.aim.direction) <= growth * heading_window(context)
     )
 
 
@@ -82,19 +88,23 @@ class Align(Leaf):
         aim = context.aim.direction
         ahead, left = in_aim_frame(context.ball.position, aim)
         offset = left - lateral
-        lined_up = (
-            abs(offset) <= 2.0 * parameters.kick_lateral_window and abs(aim) <= 2.0 * parameters.kick_heading_window
-        )
-        distance = parameters.kick_ahead if lined_up else parameters.kick_wait_ahead
-        forward = parameters.near_gain * (ahead - distance)
-        if ahead < parameters.kick_wait_ahead:
-            forward = max(-parameters.kick_align_speed, min(parameters.kick_align_speed, forward))
+        lined_up = abs(offset) <= 2.0 * parameters.kick_lateral_window and abs(aim) <= 2.0 * heading_window(context)
+        forward = self._forward(ahead, lined_up)
         x, y = from_aim_frame(forward, parameters.near_gain * offset, aim)
         context.walk(limited((x, y, parameters.heading_gain * aim), parameters))
         track_ball(context)
         if ahead < parameters.kick_wait_ahead:
             context.glance = None  # the last steps need the ball in view
         return Status.RUNNING
+
+    def _forward(self, ahead: float, lined_up: bool) -> float:
+        """Return the speed towards the ball [m/s]: it has to be low before the toe can touch the ball."""
+        parameters = self.context.parameters
+        to_wait = ahead - parameters.kick_wait_ahead
+        if to_wait > 0.0:
+            return parameters.kick_approach_gain * to_wait + (parameters.kick_align_speed if lined_up else 0.0)
+        forward = parameters.near_gain * (ahead - parameters.kick_ahead if lined_up else to_wait)
+        return max(-parameters.kick_align_speed, min(parameters.kick_align_speed, forward))
 
 
 class Settle(Leaf):

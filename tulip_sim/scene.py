@@ -1,0 +1,215 @@
+"""What stands on the field at one instant, as the camera's renderer wants it: boxes, cylinders, nets, a ball."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tulip_description.field import Field, Goal
+from tulip_description.keeper import keeper_parts
+from tulip_description.planar import Pose2D
+from tulip_description.robot import Robot
+from tulip_sim.solids import Colour, View
+
+Array = NDArray[np.float64]
+
+COLOURS: dict[str, Colour] = {
+    "yellow": (38.0, 200.0, 232.0),
+    "blue": (186.0, 92.0, 36.0),
+    "orange": (28.0, 112.0, 246.0),
+    "cyan": (214.0, 196.0, 44.0),
+    "magenta": (150.0, 52.0, 214.0),
+    "black": (42.0, 40.0, 40.0),
+    "grey": (142.0, 138.0, 136.0),
+}
+"""BGR of things in full light."""
+
+THREAD_GAP = 0.15  # [m] between two threads of a net
+UNSEEN = ("neck", "head")  # links that carry the camera; it does not see them
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """Boxes in map.
+
+    Attributes:
+        transforms: (B, 4, 4) of each box's middle in map.
+        sizes: (B, 3) full edges [m].
+        colours: (B, 3) BGR.
+    """
+
+    transforms: Array
+    sizes: Array
+    colours: Array
+
+    def __add__(self, other: Boxes) -> Boxes:
+        """Return the boxes of both."""
+        return Boxes(
+            np.concatenate([self.transforms, other.transforms]),
+            np.concatenate([self.sizes, other.sizes]),
+            np.concatenate([self.colours, other.colours]),
+        )
+
+    def inside(self, view: View, camera_in_map: Array) -> Boxes:
+        """Return those that a camera may see, by their bounding spheres."""
+        middles = (self.transforms[:, :3, 3] - camera_in_map[:3, 3]) @ camera_in_map[:3, :3]
+        reach = np.linalg.norm(self.sizes, axis=1) / 2.0
+        seen = (view.inside(middles) > -reach[:, None] * view.steepest).all(axis=1)
+        return Boxes(self.transforms[seen], self.sizes[seen], self.colours[seen])
+
+
+NO_BOXES = Boxes(np.empty((0, 4, 4)), np.empty((0, 3)), np.empty((0, 3)))
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A cylinder in map: from start to end [m], with sections of equal length in the given colours (BGR)."""
+
+    start: Array
+    end: Array
+    radius: float
+    colours: tuple[Colour, ...]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What moves or may be missing; lines and goals are always there.
+
+    Attributes:
+        ball: (3,) centre of the ball in map [m], or None.
+        boxes: Figures on the field, and the robot's own body.
+        poles: Whether the landmark poles stand.
+        shadows: (n, 3) x, y, radius [m] of dark spots on the ground below things.
+    """
+
+    ball: Array | None
+    boxes: Boxes = NO_BOXES
+    poles: bool = True
+    shadows: tuple[tuple[float, float, float], ...] = ()
+
+
+def keeper_boxes(pose: Pose2D, team_colour: str) -> Boxes:
+    """Return the boxes of a keeper figure that stands at a pose in map."""
+    parts = keeper_parts(team_colour)
+    figure = np.eye(4)
+    figure[:2, :2] = pose.rotation()
+    figure[:2, 3] = pose.x, pose.y
+    transforms = np.tile(figure, (len(parts), 1, 1))
+    transforms[:, :3, 3] += np.array([part.centre for part in parts]) @ figure[:3, :3].T
+    return Boxes(transforms, np.array([part.size for part in parts]), np.array([COLOURS[part.colour] for part in parts]))
+
+
+def goal_cylinders(goal: Goal) -> tuple[Cylinder, ...]:
+    """Return both posts and the crossbar of a goal."""
+    left, right = goal.posts
+    colour = (COLOURS[left.colour],)
+    # The bar ends on the posts' axes; its own axis lies a radius above its lower side.
+    bar = goal.height + left.radius
+    upright = [
+        Cylinder(np.array([post.x, post.y, 0.0]), np.array([post.x, post.y, post.height]), post.radius, colour)
+        for post in (left, right)
+    ]
+    across = Cylinder(np.array([left.x, left.y, bar]), np.array([right.x, right.y, bar]), left.radius, colour)
+    return (*upright, across)
+
+
+def pole_cylinders(field: Field) -> tuple[Cylinder, ...]:
+    """Return the landmark poles."""
+    return tuple(
+        Cylinder(
+            np.array([pole.x, pole.y, 0.0]),
+            np.array([pole.x, pole.y, pole.height]),
+            pole.radius,
+            tuple(COLOURS[colour] for colour in pole.colours),
+        )
+        for pole in field.poles
+    )
+
+
+def net_threads(goal: Goal) -> Array:
+    """Return the threads of a goal's net (back, roof and both sides) as (n, 2, 3) straight lines in map [m]."""
+    x0, x1 = goal.x, goal.back
+    y0, y1 = goal.posts[1].y, goal.posts[0].y
+    top = goal.posts[0].height
+    xs, ys, zs = (_steps(low, high) for low, high in ((x0, x1), (y0, y1), (0.0, top)))
+    threads: list[tuple[tuple[float, float, float], tuple[float, float, float]]] = []
+    threads += [((x1, y, 0.0), (x1, y, top)) for y in ys] + [((x1, y0, z), (x1, y1, z)) for z in zs]
+    threads += [((x, y0, top), (x, y1, top)) for x in xs[1:-1]] + [((x0, y, top), (x1, y, top)) for y in ys[1:-1]]
+    for y in (y0, y1):
+        threads += [((x, y, 0.0), (x, y, top)) for x in xs[1:-1]] + [((x0, y, z), (x1, y, z)) for z in zs[:-1]]
+    return np.array(threads)
+
+
+def _steps(low: float, high: float) -> Sequence[float]:
+    return [float(value) for value in np.linspace(low, high, max(round(abs(high - low) / THREAD_GAP), 1) + 1)]
+
+
+class Body:
+    """The robot's own body: where its links and its camera are for given joint angles."""
+
+    def __init__(self, robot: Robot, team_colour: str) -> None:
+        """Collect the boxes.
+
+        Args:
+            robot: A robot with a camera.
+            team_colour: Of its marker.
+
+        Raises:
+            ValueError: if the robot has no camera.
+        """
+        if robot.camera is None:
+            raise ValueError(f"variant {robot.variant!r} has no camera; expected the playing variant")
+        self._robot = robot
+        self._camera = robot.camera
+        self._soles = robot.soles
+        self._columns = {joint.name: column for column, joint in enumerate(robot.moving)}
+        seen = [(link.name, box) for link in robot.links for box in link.boxes if link.name not in UNSEEN]
+        self._links = [name for name, _ in seen]
+        self._centres = np.array([box.centre for _, box in seen])
+        self._sizes = np.array([box.size for _, box in seen])
+        self._colours = np.array([COLOURS[team_colour if box.colour == "marker" else box.colour] for _, box in seen])
+
+    def links_in_map(self, base_in_map: Array, joint_positions: Array) -> dict[str, Array]:
+        """Return the (4, 4) transform of each link in map.
+
+        Args:
+            base_in_map: (4, 4) transform of base_link in map.
+            joint_positions: (n,) [rad], order of JOINTS.
+        """
+        found = {self._robot.links[0].name: base_in_map}
+        for joint in self._robot.joints:
+            step = np.eye(4)
+            step[:3, 3] = joint.origin
+            if not joint.fixed:
+                step[:3, :3] = _turn(np.array(joint.axis), float(joint_positions[self._columns[joint.name]]))
+            found[joint.child] = found[joint.parent] @ step
+        return found
+
+    def camera_in_map(self, links: dict[str, Array]) -> Array:
+        """Return the (4, 4) transform of camera_optical_frame in map, from the links' transforms."""
+        optical = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+        optical[:3, 3] = self._camera.origin
+        camera: Array = links[self._camera.link] @ optical
+        return camera
+
+    def boxes(self, links: dict[str, Array]) -> Boxes:
+        """Return the boxes of all links that the camera can see."""
+        transforms = np.stack([links[name] for name in self._links])
+        transforms[:, :3, 3] += np.einsum("bij,bj->bi", transforms[:, :3, :3], self._centres)
+        return Boxes(transforms, self._sizes, self._colours)
+
+    def feet(self, links: dict[str, Array]) -> list[tuple[float, float]]:
+        """Return x, y of both soles in map [m]."""
+        places = [links[sole.link][:3, 3] + links[sole.link][:3, :3] @ np.array(sole.origin) for sole in self._soles]
+        return [(float(place[0]), float(place[1])) for place in places]
+
+
+def _turn(axis: Array, angle: float) -> Array:
+    """Return the rotation matrix about a unit axis (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    rotation: Array = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
+    return rotation
