@@ -21,19 +21,21 @@ class KeeperPart:
         centre: x, y, z of its middle in keeper [m].
         size: Its edges along x, y, z [m].
         colour: Name of its colour: black, grey or a team colour.
+        solid: Whether the ball bounces off it; else it is only seen.
     """
 
     name: str
     centre: tuple[float, float, float]
     size: tuple[float, float, float]
     colour: str
+    solid: bool = True
 
 
 def keeper_parts(team_colour: str = "cyan") -> tuple[KeeperPart, ...]:
-    """Return the boxes of the figure: 1.20 m high, 0.42 m wide, none inside another.
+    """Return the boxes of the figure: 1.30 m high, 0.60 m wide, none inside another.
 
     Args:
-        team_colour: Of the markers on upper arms and chest, cyan or magenta.
+        team_colour: Of the arms and of the plates on chest and back, cyan or magenta.
 
     Raises:
         ValueError: if the colour is another one.
@@ -41,18 +43,16 @@ def keeper_parts(team_colour: str = "cyan") -> tuple[KeeperPart, ...]:
     if team_colour not in TEAM_COLOURS:
         raise ValueError(f"team_colour is {team_colour!r}; expected {' or '.join(TEAM_COLOURS)}")
     parts = [
-        KeeperPart("trunk", (0.0, 0.0, 0.80), (0.15, 0.28, 0.40), "grey"),
-        KeeperPart("chest_marker", (0.0775, 0.0, 0.85), (0.005, 0.18, 0.18), team_colour),
-        KeeperPart("back_marker", (-0.0775, 0.0, 0.85), (0.005, 0.18, 0.18), team_colour),
-        KeeperPart("neck", (0.0, 0.0, 1.02), (0.06, 0.06, 0.04), "black"),
-        KeeperPart("head", (0.0, 0.0, 1.12), (0.14, 0.14, 0.16), "black"),
+        KeeperPart("trunk", (0.0, 0.0, 0.87), (0.18, 0.40, 0.46), "grey"),
+        KeeperPart("chest_marker", (0.0925, 0.0, 0.95), (0.005, 0.24, 0.20), team_colour, solid=False),
+        KeeperPart("back_marker", (-0.0925, 0.0, 0.95), (0.005, 0.24, 0.20), team_colour, solid=False),
+        KeeperPart("neck", (0.0, 0.0, 1.11), (0.06, 0.06, 0.02), "black", solid=False),
+        KeeperPart("head", (0.0, 0.0, 1.21), (0.14, 0.14, 0.18), "black"),
     ]
     for name, side in (("left", 1.0), ("right", -1.0)):
         parts += [
-            KeeperPart(f"{name}_foot", (0.03, side * 0.10, 0.03), (0.22, 0.12, 0.06), "black"),
-            KeeperPart(f"{name}_shank", (0.0, side * 0.10, 0.19), (0.09, 0.08, 0.26), "grey"),
-            KeeperPart(f"{name}_thigh", (0.0, side * 0.10, 0.46), (0.11, 0.09, 0.28), "black"),
-            KeeperPart(f"{name}_upper_arm", (0.0, side * 0.175, 0.87), (0.07, 0.07, 0.22), team_colour),
-            KeeperPart(f"{name}_forearm", (0.0, side * 0.175, 0.64), (0.06, 0.06, 0.24), "black"),
+            KeeperPart(f"{name}_foot", (0.04, side * 0.14, 0.03), (0.22, 0.15, 0.06), "black"),
+            KeeperPart(f"{name}_leg", (0.0, side * 0.14, 0.35), (0.11, 0.11, 0.58), "grey"),
+            KeeperPart(f"{name}_arm", (0.0, side * 0.26, 0.86), (0.08, 0.08, 0.44), team_colour),
         ]
     return tuple(parts)

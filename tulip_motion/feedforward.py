@@ -8,6 +8,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from tulip_motion.inverse_kinematics import inverse_of_base_jacobian, skew
+
 Array = NDArray[np.float64]
 
 
@@ -44,12 +46,13 @@ def feedforward(
     """
     generalized = pin.rnea(model, data, configuration, velocity, acceleration)
     torques: Array = generalized[6:].copy()
-    wrench = np.linalg.solve(sole_jacobians[0][:, :6].T, generalized[:6])
+    wrench = inverse_of_base_jacobian(sole_jacobians[0]).T @ generalized[:6]
     force = wrench[:3]
+    turn = skew(force)  # r x f = -S(f) r
     centre = (1.0 - right_share) * aims[0] + right_share * aims[1]
-    moment = wrench[3:] + np.cross(soles[0] - centre, force)
+    moment = wrench[3:] - turn @ (soles[0] - centre)
     for share, sole, jacobian, aim in zip((1.0 - right_share, right_share), soles, sole_jacobians, aims, strict=True):
         if share > 0.0:
-            at_sole = np.concatenate([force, moment + np.cross(aim - sole, force)])
+            at_sole = np.concatenate([force, moment - turn @ (aim - sole)])
             torques -= share * (jacobian[:, 6:].T @ at_sole)
     return torques

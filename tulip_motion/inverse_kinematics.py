@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
 
 from tulip_description import frames
 from tulip_motion.gait import FootMotion
@@ -68,7 +69,37 @@ def error_rate_matrix(desired: Array, actual: Array) -> Array:
 
     From S(a) S(b) = b a^T - (a . b) I, the sum is 1/2 (trace(R_d^T R_e) I - R_e R_d^T).
     """
-    return 0.5 * (np.trace(desired.T @ actual) * np.eye(3) - actual @ desired.T)
+    matrix: Array = -0.5 * (actual @ desired.T)
+    matrix.flat[::4] += 0.5 * float(np.vdot(desired, actual))
+    return matrix
+
+
+def solve_3(matrix: Array, right: Array) -> Array:
+    """Solve a 3 x 3 system by Cramer's rule: a tenth of the time of numpy's general solver."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    x, y, z = right.tolist()
+    ei_fh, di_fg, dh_eg = e * i - f * h, d * i - f * g, d * h - e * g
+    determinant = a * ei_fh - b * di_fg + c * dh_eg
+    return np.array(
+        [
+            x * ei_fh - b * (y * i - f * z) + c * (y * h - e * z),
+            a * (y * i - f * z) - x * di_fg + c * (d * z - y * g),
+            a * (e * z - y * h) - b * (d * z - y * g) + x * dh_eg,
+        ]
+    ) / determinant
+
+
+def inverse_of_base_jacobian(jacobian: Array) -> Array:
+    """Return the inverse of the first six columns of a frame's (6, 18) Jacobian in odom axes.
+
+    They are [[R, -S(r) R], [0, R]] with the base's rotation R and the frame's place r from the base, whose inverse
+    is [[R^T, R^T S(r)], [0, R^T]].
+    """
+    turn = jacobian[3:6, 3:6].T
+    inverse = np.zeros((6, 6))
+    inverse[:3, :3] = inverse[3:, 3:] = turn
+    inverse[:3, 3:] = -turn @ jacobian[:3, 3:6] @ turn
+    return inverse
 
 
 class InverseKinematics:
@@ -103,6 +134,8 @@ class InverseKinematics:
         """J of eq. (5) at `configuration`."""
         self._task_of_base = np.zeros((12, 6))
         self._base_of_joints = np.zeros((6, 12))
+        self._base_of_wrench = np.eye(6)
+        self._factor = (np.eye(12), False)
         self._stance = Side.LEFT
 
     def reset(self, base_rotation: Array, base_position: Array, joint_positions: Array) -> None:
@@ -145,9 +178,11 @@ class InverseKinematics:
         task[3:6, 3:6] = data.oMi[1].rotation
         task[6:] = self.sole_jacobians[stance.other]
         fixed = self.sole_jacobians[stance]
-        self._base_of_joints = -np.linalg.solve(fixed[:, :6], fixed[:, 6:])
+        self._base_of_wrench = inverse_of_base_jacobian(fixed)
+        self._base_of_joints = -self._base_of_wrench @ fixed[:, 6:]
         self._task_of_base = task[:, :6]
         self.jacobian = task[:, 6:] + self._task_of_base @ self._base_of_joints
+        self._factor = cho_factor(self.jacobian.T @ self.jacobian + self._damping, check_finite=False)
         self._stance = stance
 
     def solve_velocity(self, target: TaskTarget) -> None:
@@ -181,8 +216,7 @@ class InverseKinematics:
         stance_drift = pin.getFrameClassicalAcceleration(
             model, data, self.sole_frames[self._stance], pin.LOCAL_WORLD_ALIGNED
         ).vector
-        fixed = self.sole_jacobians[self._stance]
-        base = -np.linalg.solve(fixed[:, :6], stance_drift)
+        base = -self._base_of_wrench @ stance_drift
         joints = self._damped_solve(task_acceleration - drift - self._task_of_base @ base)
         return np.concatenate([base + self._base_of_joints @ joints, joints])
 
@@ -205,8 +239,8 @@ class InverseKinematics:
         """Return L^-1 (L^T w_d + K_o e_o), the orientation rows of eq. (10)."""
         matrix = error_rate_matrix(desired, actual)
         error = orientation_error(desired, actual)
-        return np.linalg.solve(matrix, matrix.T @ angular_velocity + self._gain_orientation * error)
+        return solve_3(matrix, matrix.T @ angular_velocity + self._gain_orientation * error)
 
     def _damped_solve(self, rate: Array) -> Array:
-        j = self.jacobian
-        return np.linalg.solve(j.T @ j + self._damping, j.T @ rate)
+        solution: Array = cho_solve(self._factor, self.jacobian.T @ rate, check_finite=False)
+        return solution

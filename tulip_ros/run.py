@@ -141,21 +141,29 @@ def session(
         rclpy.try_shutdown()
 
 
-def run(make_node: Callable[[], Node], arguments: Sequence[str] | None = None) -> NoReturn:
+def run(make_node: Callable[[], N], advance: Callable[[N, Callable[[float], None]], None] | None = None) -> NoReturn:
     """Run a node until SIGINT or SIGTERM, then end the process.
 
-    Args:
-        make_node: Makes the node; called after ROS was started.
-        arguments: As for `session`.
-
     Exit codes: 0 after a signal, 2 for bad input (message, no traceback); any other error ends with its traceback.
+
+    Args:
+        make_node: Makes the node.
+        advance: For a node with a loop of its own: called again and again with the node and a function that waits
+            up to so many seconds [s] for messages and handles them. By default the node only handles messages.
     """
     try:
-        with session(make_node, arguments) as (_, spin):
+        with session(make_node) as (node, spin):
             while rclpy.ok():
-                spin(SPIN)
+                if advance is None:
+                    spin(SPIN)
+                else:
+                    advance(node, spin)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except rclpy_implementation.RCLError:
+        if rclpy.ok():
+            raise
+        # A signal shut ROS down in the middle of a callback, which then could not publish: that is a clean end.
     except BadInputError as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(EXIT_BAD_INPUT) from None

@@ -45,9 +45,6 @@ class Backdrop:
         """
         self._width, self._height = lens.width, lens.height
         self._ground = ground
-        # The picture's rows run along map x or along map y. Reading along a row of memory is several times faster than
-        # across rows, so both orders are kept.
-        self._levels = (ground.levels, tuple(np.ascontiguousarray(level.T) for level in ground.levels))
         self._palette = palette
         self._wall = wall
         self._wall_radius = wall_radius
@@ -72,36 +69,30 @@ class Backdrop:
         steepness = -directions[2]
         reach = np.float32(height) / np.maximum(steepness, np.float32(STEEPEST))
         ground = np.stack([directions[0] * reach + np.float32(x), directions[1] * reach + np.float32(y)], axis=2)
-        turned = int(abs(camera_in_map[1, 0]) > abs(camera_in_map[0, 0]))
-        levels = self._levels[turned]
         ground -= np.array([self._ground.left, self._ground.lower], np.float32)
-        if turned:
-            ground = ground[..., ::-1]
         index = np.zeros((self._height, self._width), np.uint8)
         for row in range(0, self._height, STRIP):
             blocks = slice(row // BLOCK, row // BLOCK + STRIP // BLOCK + 2)
             if float(steepness[blocks].max()) > STEEPEST:
                 ahead = float(steepness[blocks].mean())
-                self._draw_ground(index[row : row + STRIP], levels, ground[blocks], height, ahead)
+                self._draw_ground(index[row : row + STRIP], ground[blocks], height, ahead)
         picture = np.asarray(cv2.applyColorMap(index, self._palette), np.uint8)
         self._draw_wall(picture, directions, (x, y, height))
         return picture
 
-    def _draw_ground(
-        self, index: Bytes, levels: tuple[Bytes, ...], ground: Float, height: float, ahead: float
-    ) -> None:
+    def _draw_ground(self, index: Bytes, ground: Float, height: float, ahead: float) -> None:
         """Fill rows of the index picture.
 
         Args:
             index: The rows, drawn into.
-            levels: The ground in several resolutions.
-            ground: (blocks, columns, 2) where rays meet the ground [m], counted from the corner of the levels.
+            ground: (blocks, columns, 2) where rays meet the ground [m], from the corner of its pictures.
             height: Of the camera [m].
             ahead: Downward part of the ray in the middle of the rows.
         """
         reach = height / max(ahead, 0.02)  # [m] range to the ground in the middle of the strip
         across = reach / self._focal  # [m] ground that one pixel sees, sideways
         along = across * reach / height  # and away from the camera
+        levels = self._ground.levels
         level = round(math.log2(max(SHARPNESS * across / self._ground.resolution(0), 1.0)))
         level = min(level, len(levels) - 1)
         pixel = self._ground.resolution(level)
@@ -153,7 +144,7 @@ class Backdrop:
 
     @staticmethod
     def _finer(blocks: Float, rows: int, columns: int) -> Float:
-        """Interpolate values at the middles of blocks, rows x columns values a block, and leave out the outer blocks."""
+        """Interpolate between the middles of blocks, rows x columns values a block, and leave out the outer blocks."""
         size = (blocks.shape[1] * columns, blocks.shape[0] * rows)
         fine = cv2.resize(blocks, size, interpolation=cv2.INTER_LINEAR)
         return np.asarray(fine[rows:-rows, columns:-columns], np.float32)

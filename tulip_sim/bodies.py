@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from tulip_description.field import Field, Goal
@@ -20,6 +19,7 @@ from tulip_description.robot import Box, Robot, realizable_inertia
 from tulip_description.urdf import build_urdf
 from tulip_sim.keeper import KEEPER_BOXES, Keeper
 from tulip_sim.parameters import WorldParameters
+from tulip_sim.physics import pybullet
 
 Array = NDArray[np.float64]
 GRAVITY = 9.81  # [m/s^2] as in the robot's models

@@ -263,7 +263,8 @@ def _noise_tile(lens: Lens, deviation: float, rng: np.random.Generator) -> Bytes
     noise = rng.standard_normal(shape).astype(np.float32)
     noise = np.asarray(cv2.GaussianBlur(noise, (3, 3), 0.55), np.float32)
     noise *= np.float32(deviation / float(noise.std()))
-    return np.clip(noise + 128.0, 0.0, 255.0).round().astype(np.uint8)
+    tile: Bytes = np.clip(noise + 128.0, 0.0, 255.0).round().astype(np.uint8)
+    return tile
 
 
 def _rotation(quaternion: Array) -> Array:

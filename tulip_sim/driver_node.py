@@ -8,15 +8,12 @@ the world advances by one tick, motion control computes the answer that acts in 
 from __future__ import annotations
 
 import math
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
 import numpy as np
-import rclpy
-from rclpy.executors import ExternalShutdownException
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
@@ -29,8 +26,7 @@ from tulip_msgs.msg import FootForces
 from tulip_msgs.msg import JointCommand as JointCommandMessage
 from tulip_msgs.srv import PlaceBall, Push, Reset
 from tulip_ros import topics
-from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
-from tulip_ros.run import ComponentNode, session
+from tulip_ros.run import ComponentNode, run
 from tulip_ros.time import stamp_of, to_message
 from tulip_sim.camera import CameraParameters, CameraRenderer
 from tulip_sim.messages import jpeg_to_message, lens_to_message, picture_to_message, truth_to_message
@@ -115,7 +111,6 @@ class DriverNode(ComponentNode):
             (topics.PUSH, self._on_push),
         ):
             self.create_service(service.type, service.name, answer)
-        self.start_bound = p.start_bound
         self._begin(p.scenario, p.seed)
 
     def _begin(self, scenario: str, seed: int) -> None:
@@ -133,11 +128,17 @@ class DriverNode(ComponentNode):
         self._paced_from = (time.monotonic(), 0)
         self._lens_sender.publish(lens_to_message(self._lens, 0))
 
-    def missing_nodes(self) -> list[str]:
-        """Return the nodes of `wait_for` that are not in the graph."""
-        own = self.get_namespace()
-        present = {name for name, namespace in self.get_node_names_and_namespaces() if namespace == own}
-        return [name for name in self._parameters.wait_for if name not in present]
+    def _await_nodes(self, spin: Callable[[float], None]) -> None:
+        """Wait until the nodes of `wait_for` are in the graph, so that time begins with a whole robot."""
+        p, own = self._parameters, self.get_namespace()
+        begin = time.monotonic()
+        missing = set(p.wait_for)
+        while missing and time.monotonic() - begin < p.start_bound:
+            spin(REPEAT)
+            missing -= {name for name, namespace in self.get_node_names_and_namespaces() if namespace == own}
+        if missing:
+            self.health.count("started without nodes", f"time begins without {', '.join(sorted(missing))}")
+        self._paced_from = (time.monotonic(), self._world.stamp)
 
     def advance(self, spin: Callable[[float], None]) -> None:
         """Let one control tick pass.
@@ -147,6 +148,8 @@ class DriverNode(ComponentNode):
         """
         sensors = self._world.sensors()
         messages = sensors_to_messages(sensors, self._cells)
+        if self._tick == 0:
+            self._await_nodes(spin)
         self._send(messages)
         spin(0.0)
         if self._asked is not None and self._waits:
@@ -260,19 +263,7 @@ class DriverNode(ComponentNode):
 
 def main() -> NoReturn:
     """Run the simulator until SIGINT or SIGTERM."""
-    try:
-        with session(DriverNode) as (node, spin):
-            begin = time.monotonic()
-            while rclpy.ok() and node.missing_nodes() and time.monotonic() - begin < node.start_bound:
-                spin(0.1)
-            while rclpy.ok():
-                node.advance(spin)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except BadInputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        raise SystemExit(EXIT_BAD_INPUT) from None
-    raise SystemExit(0)
+    run(DriverNode, DriverNode.advance)
 
 
 if __name__ == "__main__":

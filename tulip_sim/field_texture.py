@@ -84,7 +84,7 @@ def paint_ground(field: Field, mottling: float, rng: np.random.Generator) -> Gro
         cv2.fillPoly(paint, [ring.astype(np.int32)], colour, cv2.LINE_8, SHIFT)
     _bar(paint, pixel, (-half, -circle.radius), (half, circle.radius))  # the halfway line, which the disc wiped out
     picture[paint > 0] = LINE - rng.integers(0, 16, int((paint > 0).sum()), dtype=np.uint8)
-    levels = [np.ascontiguousarray(picture)]
+    levels: list[Bytes] = [np.ascontiguousarray(picture)]
     for _ in range(LEVELS - 1):
         finer = levels[-1]
         even = finer[: finer.shape[0] // 2 * 2, : finer.shape[1] // 2 * 2]
@@ -105,7 +105,8 @@ def ground_palette(floor: tuple[int, int, int], carpet: tuple[int, int, int], li
     }
     where = list(anchors)
     channels = [np.interp(np.arange(256), where, [colour[c] for colour in anchors.values()]) for c in range(3)]
-    return np.clip(np.stack(channels, axis=1), 0, 255).round().astype(np.uint8)[:, None, :]
+    palette: Bytes = np.clip(np.stack(channels, axis=1), 0, 255).round().astype(np.uint8)[:, None, :]
+    return palette
 
 
 def paint_wall(circumference: float, height: float, resolution: float, rng: np.random.Generator) -> Bytes:

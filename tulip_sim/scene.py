@@ -99,7 +99,9 @@ def keeper_boxes(pose: Pose2D, team_colour: str) -> Boxes:
     figure[:2, 3] = pose.x, pose.y
     transforms = np.tile(figure, (len(parts), 1, 1))
     transforms[:, :3, 3] += np.array([part.centre for part in parts]) @ figure[:3, :3].T
-    return Boxes(transforms, np.array([part.size for part in parts]), np.array([COLOURS[part.colour] for part in parts]))
+    return Boxes(
+        transforms, np.array([part.size for part in parts]), np.array([COLOURS[part.colour] for part in parts])
+    )
 
 
 def goal_cylinders(goal: Goal) -> tuple[Cylinder, ...]:

@@ -33,10 +33,7 @@ BOX_NORMALS = np.array([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1]
 # The face on the other side of each edge (corner j to j + 1) of each face: the other one that has both corners.
 BOX_NEIGHBOURS = np.array(
     [
-        [
-            next(g for g in range(6) if g != f and {face[j], face[(j + 1) % 4]} <= set(BOX_FACES[g]))
-            for j in range(4)
-        ]
+        [next(g for g in range(6) if g != f and {face[j], face[(j + 1) % 4]} <= set(BOX_FACES[g])) for j in range(4)]
         for f, face in enumerate(BOX_FACES)
     ]
 )
@@ -124,8 +121,9 @@ def box_faces(transforms: Array, sizes: Array, colours: Array, eye: Array) -> Fa
 def _depth_keys(transforms: Array, sizes: Array, eye: Array, nearest: Array) -> Array:
     """Return (B,) distances that give the order of drawing: the nearest ones, corrected where one box hides another.
 
-    Where the plane of a face of one box has the other box on its far side, and the eye too, then the first cannot hide the
-    second. Boxes that do not touch each other are put in order by that; a cycle is cut at its farthest box.
+    A box cannot hide another one that lies, with the eye, on the outer side of the plane of one of its faces; nor one
+    that such a plane separates from box and eye together. That puts boxes which do not overlap in order; a cycle is
+    cut at its farthest box.
     """
     count = len(sizes)
     corners = transforms[:, None, :3, 3] + np.einsum("bij,bnj->bni", transforms[:, :3, :3], CORNERS * sizes[:, None])
@@ -155,7 +153,9 @@ def _depth_keys(transforms: Array, sizes: Array, eye: Array, nearest: Array) -> 
     return keys
 
 
-def cylinder_faces(start: Array, end: Array, radius: float, colours: Sequence[Colour], eye: Array, focal: float) -> Faces:
+def cylinder_faces(
+    start: Array, end: Array, radius: float, colours: Sequence[Colour], eye: Array, focal: float
+) -> Faces:
     """Return a cylinder's side towards the eye as narrow strips, and its end that looks towards the eye.
 
     Args:
@@ -189,7 +189,12 @@ def cylinder_faces(start: Array, end: Array, radius: float, colours: Sequence[Co
     top_seen, bottom_seen = along > length, along < 0.0
     for section, colour in enumerate(colours):
         for i in range(strips):
-            points += [at[section] + edge[i], at[section] + edge[i + 1], at[section + 1] + edge[i + 1], at[section + 1] + edge[i]]
+            points += [
+                at[section] + edge[i],
+                at[section] + edge[i + 1],
+                at[section + 1] + edge[i + 1],
+                at[section + 1] + edge[i],
+            ]
             outline += [
                 section == 0 and not bottom_seen,
                 i == strips - 1,
@@ -200,9 +205,14 @@ def cylinder_faces(start: Array, end: Array, radius: float, colours: Sequence[Co
     counts = [4] * (strips * sections)
     if top_seen or bottom_seen:
         angles = np.linspace(0.0, 2.0 * math.pi, 17)[:-1] + math.pi / 16.0
-        points += list((at[-1] if top_seen else at[0]) + radius * (np.cos(angles)[:, None] * towards + np.sin(angles)[:, None] * sideways))
+        points += list(
+            (at[-1] if top_seen else at[0])
+            + radius * (np.cos(angles)[:, None] * towards + np.sin(angles)[:, None] * sideways)
+        )
         outline += list(np.cos(angles + math.pi / 16.0) < 0.0)  # the far half of the rim
-        shaded.append(np.array(colours[-1 if top_seen else 0]) * float(light(axis[None] if top_seen else -axis[None])[0]))
+        shaded.append(
+            np.array(colours[-1 if top_seen else 0]) * float(light(axis[None] if top_seen else -axis[None])[0])
+        )
         counts.append(16)
     faces = len(counts)
     return Faces(np.array(points), np.array(outline), np.array(counts), np.array(shaded), np.full(faces, distance))
@@ -219,7 +229,13 @@ class View:
         self.lens = lens
         self.focal = float(lens.camera_matrix[0, 0])
         self.normals = np.array(
-            [[-1.0, 0.0, tangents[0]], [1.0, 0.0, tangents[0]], [0.0, -1.0, tangents[1]], [0.0, 1.0, tangents[1]], [0.0, 0.0, 1.0]]
+            [
+                [-1.0, 0.0, tangents[0]],
+                [1.0, 0.0, tangents[0]],
+                [0.0, -1.0, tangents[1]],
+                [0.0, 1.0, tangents[1]],
+                [0.0, 0.0, 1.0],
+            ]
         )
         self.steepest = float(np.linalg.norm(self.normals, axis=1).max())
         self.offsets = np.array([0.0, 0.0, 0.0, 0.0, NEAR])
@@ -320,9 +336,13 @@ def shrink(pixels: Array, outline: NDArray[np.bool_], counts: NDArray[np.int64])
     cross = before[:, 0] * normal[:, 1] - before[:, 1] * normal[:, 0]
     corner = np.abs(cross) > 0.15
     safe = np.where(corner, cross, 1.0)
-    met = np.stack(
-        [moved_before * normal[:, 1] - move * before[:, 1], before[:, 0] * move - normal[:, 0] * moved_before], axis=1
-    ) / safe[:, None]
+    met = (
+        np.stack(
+            [moved_before * normal[:, 1] - move * before[:, 1], before[:, 0] * move - normal[:, 0] * moved_before],
+            axis=1,
+        )
+        / safe[:, None]
+    )
     straight = (before * moved_before[:, None] + normal * move[:, None]) / 2.0
     shift = np.where(corner[:, None], met, straight)
     size = np.maximum(np.hypot(shift[:, 0], shift[:, 1]), 1e-9)

@@ -8,7 +8,6 @@ from collections import deque
 
 import numpy as np
 import pinocchio as pin
-import pybullet
 from numpy.typing import ArrayLike, NDArray
 
 from tulip_description import frames
@@ -21,6 +20,7 @@ from tulip_description.robot_io import JointCommand, Sensors
 from tulip_sim import bodies
 from tulip_sim.driver import MILLISECOND, JointDriver
 from tulip_sim.parameters import WorldParameters
+from tulip_sim.physics import pybullet
 from tulip_sim.scenario import Scenario
 from tulip_sim.sensors import BodyState, SensorModel, cell_forces
 from tulip_sim.truth import Truth

@@ -82,7 +82,7 @@ class StrategyParameters:
     gap_preference: float = 1.25  # another gap has to be this much wider to change the side
 
     # Ball lost and found.
-    ball_lost_age: float = 3.0  # [s] unseen: longer than a glance and the time a ball at the feet may be hidden
+    ball_lost_age: float = 5.0  # [s] unseen: a resting ball stays where it was while the way round turns the back on it
     ball_found_age: float = 0.5  # [s] seen again
     ball_gone_time: float = 1.0  # [s] without any estimate: bridges one that is dropped and made again
     ball_confidence: float = 0.25  # below this it may be a false sighting

@@ -232,13 +232,13 @@ def _shape(
     along = place.arms().reshape(-1, 2)
     diagonals = [a * place.first + b * place.second for a in (1.0, -1.0) for b in (1.0, -1.0)]
     between = np.concatenate([place.point + np.array([[0.14], [0.2]]) * diagonal for diagonal in diagonals])
-    carpet_values, carpet_inside = view.sample(segmentation.whiteness, view.pixels_on_ground(between))
-    classes, _ = view.sample(segmentation.classes, view.pixels_on_ground(between))
+    images = (segmentation.whiteness, segmentation.classes)
+    (carpet_values, classes), carpet_inside = view.sample_all(images, view.pixels_on_ground(between))
     on_green = ((classes & Colour.GREEN) != 0) & carpet_inside
     if np.count_nonzero(on_green) < 5:
         return None, 0.0, "little carpet between the arms"
-    values, inside = view.sample(whiteness, view.pixels_on_ground(along))
-    arm_classes, _ = view.sample(segmentation.classes, view.pixels_on_ground(along))
+    images = (whiteness, segmentation.classes)
+    (values, arm_classes), inside = view.sample_all(images, view.pixels_on_ground(along))
     carpet = float(np.median(carpet_values[on_green]))
     samples = values.reshape(4, len(ARMS)).astype(np.float64)
     seen = inside.reshape(4, len(ARMS))

@@ -21,7 +21,7 @@ from tulip_vision.view import Array, View, angles, direction_of
 MARKERS = {"cyan": (Colour.CYAN, Colour.MAGENTA), "magenta": (Colour.MAGENTA, Colour.CYAN)}
 """Own marker colour and the opponents', by the own team's colour."""
 
-MOST_CANDIDATES = 10
+MOST_CANDIDATES = 8
 """The largest patches in the marker's colour are looked at."""
 
 NEAR_REACH = 0.5
@@ -141,6 +141,12 @@ def _examine(
     marker: _Marker, markers: list[_Marker], segmentation: Segmentation, view: View, parameters: OpponentParameters
 ) -> Feature | str:
     pixel = view.angle_per_pixel(direction_of(marker.azimuth, marker.low))
+    middle = math.tan(0.5 * (marker.low + marker.high))
+    if middle > 0.0:
+        # Seen above the camera's height, a marker of allowed height is close, and so it is large in the picture.
+        farthest = max(parameters.highest_marker - view.height, 0.0) / middle
+        if marker.area * (pixel * farthest) ** 2 < parameters.smallest_marker:
+            return "too high above the ground"
     width = marker.left - marker.right
     # First look: the marker's own width and half of it on either side is enough to hit a foot or a leg.
     low = _contact(marker, 1.0 * width + 2.0 * pixel, segmentation, view, pixel)
@@ -226,10 +232,11 @@ def _contact(marker: _Marker, half: float, segmentation: Segmentation, view: Vie
     step = 2.0 * pixel
     bottom = view.lowest_elevation - 3.0 * step
     elevations = np.arange(0.5 * (marker.low + marker.high), bottom, -step)[:240]
+    if len(elevations) < 4:
+        return None  # the marker touches the lower edge of the picture
     pixels = view.pixels_of_directions(_fan(azimuths, elevations))
-    classes, inside = view.sample(segmentation.classes, pixels)
+    (classes, on_carpet), inside = view.sample_all((segmentation.classes, segmentation.on_carpet), pixels)
     shape = (len(elevations), len(azimuths))
-    on_carpet, _ = view.sample(segmentation.on_carpet, pixels)
     # A ball at the feet is no part of the body.
     carpet = (((classes & (CARPET | Colour.ORANGE)) != 0) & (on_carpet != 0)).reshape(shape)
     seen = inside.reshape(shape)
@@ -268,8 +275,7 @@ def _middle(
     azimuths = np.linspace(marker.azimuth - half, marker.azimuth + half, 41)
     elevations = np.linspace(low + 0.02 / distance, min(marker.high, low + 0.9 / distance), 12)
     pixels = view.pixels_of_directions(_fan(azimuths, elevations))
-    classes, inside = view.sample(segmentation.classes, pixels)
-    on_carpet, _ = view.sample(segmentation.on_carpet, pixels)
+    (classes, on_carpet), inside = view.sample_all((segmentation.classes, segmentation.on_carpet), pixels)
     shape = (len(elevations), len(azimuths))
     other = Colour.ORANGE | Colour.YELLOW | Colour.BLUE
     body = (((classes & (CARPET | other)) == 0) & inside & (on_carpet != 0)).reshape(shape)

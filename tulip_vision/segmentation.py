@@ -275,11 +275,14 @@ def patches(mask: Mask, least_area: float, most: int) -> list[tuple[NDArray[np.i
         For each patch its outer contour, (n, 2) u and v [px], and its area without regard to holes [px^2].
     """
     contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    if hierarchy is None:
+        return []
+    shortest = 4.0 * (math.sqrt(least_area) - 1.0)  # of a contour round that area: a square's
     found = []
-    for index, contour in enumerate(contours):
+    for contour, parent in zip(contours, hierarchy.reshape(-1, 4)[:, 3].tolist(), strict=True):
+        if parent >= 0 or len(contour) < shortest:
+            continue  # the edge of a hole, or noise
         points: NDArray[np.int32] = contour.reshape(-1, 2)
-        if hierarchy.reshape(-1, 4)[index, 3] >= 0:
-            continue  # the edge of a hole
         # The contour runs through the middles of the edge pixels: half a pixel is missing all around.
         area = float(cv2.contourArea(contour)) + 0.5 * len(points) + 1.0
         if area >= least_area:

@@ -118,8 +118,8 @@ def _measure(points: NDArray[np.int32], segmentation: Segmentation, view: View) 
     foot = float(elevations[near_middle].min()) - 0.5 * pixel if near_middle.any() else low
     under = np.array([foot - step * pixel for step in (2.0, 3.0, 4.0, 5.0)])
     directions = np.stack([direction_of(middle, elevation) for elevation in under])
-    classes, inside = view.sample(segmentation.classes, view.pixels_of_directions(directions))
-    carpet, _ = view.sample(segmentation.on_carpet, view.pixels_of_directions(directions))
+    below = view.pixels_of_directions(directions)
+    (classes, carpet), inside = view.sample_all((segmentation.classes, segmentation.on_carpet), below)
     ground = ((classes & (Colour.GREEN | Colour.WHITE)) != 0) & (carpet != 0) & inside
     top, bottom = points[highest], points[lowest]
     return Upright(

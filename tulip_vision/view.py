@@ -142,12 +142,14 @@ class View:
 
     def angle_per_pixel(self, direction: Array) -> float:
         """Return how much one pixel sees around a direction (3,) in base_footprint [rad]."""
-        side = np.cross(direction, self.rotation[:, 2])
-        norm = float(np.linalg.norm(side))
+        x, y, z = (float(value) for value in direction)
+        a, b, c = (float(value) for value in self.rotation[:, 2])
+        side = np.array([y * c - z * b, z * a - x * c, x * b - y * a])  # np.cross is slow for single vectors
+        norm = math.sqrt(float(side @ side))
         side = self.rotation[:, 0] if norm < 1e-6 else side / norm
         step = 1e-3  # [rad] small enough to be linear, large enough for the projection's rounding
         ends = self.pixels_of_directions(np.stack([direction, direction + step * side]))
-        moved = float(np.linalg.norm(ends[1] - ends[0]))
+        moved = math.hypot(*(ends[1] - ends[0]))
         return step / moved if moved > 0.0 else 1.0 / float(self.lens.camera_matrix[0, 0])
 
     def spreads(self, direction: Array, pixels: float = 1.0) -> tuple[float, float]:
@@ -183,10 +185,17 @@ class View:
         Returns:
             (n,) values, those outside the picture read as 0, and (n,) whether each is inside.
         """
+        (values,), inside = self.sample_all((image,), pixels)
+        return values, inside
+
+    def sample_all(
+        self, images: tuple[NDArray[Any], ...], pixels: Array
+    ) -> tuple[list[NDArray[Any]], NDArray[np.bool_]]:
+        """Read several images at the same (n, 2) pixels, as `sample` does one."""
         inside = self.inside(pixels)
-        nearest = np.where(inside[:, None], np.rint(np.nan_to_num(pixels)), 0).astype(np.intp)
-        values = image[nearest[:, 1], nearest[:, 0]]
-        return np.where(inside, values, 0), inside
+        # Half a pixel is added and cut off: that rounds, as no pixel inside is negative.
+        nearest = (np.where(inside[:, None], pixels, 0.0) + 0.5).astype(np.intp)
+        return [np.where(inside, image[nearest[:, 1], nearest[:, 0]], 0) for image in images], inside
 
     def coverage(self) -> Array:
         """Return (4,) azimuth of left and right edge, elevation of lower and upper edge, at the middle [rad]."""

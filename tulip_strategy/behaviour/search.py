@@ -27,12 +27,25 @@ def find_ball(context: Context) -> Sequence:
     return sequence
 
 
+def _bearing(context: Context) -> float:
+    """Direction of the ball's last known place [rad], 0 without one."""
+    last = context.ball.position
+    return 0.0 if last is None else math.atan2(last[1], last[0])
+
+
 def _look_back_time(context: Context) -> float:
-    return 0.0 if context.ball.position is None else context.parameters.look_back_time
+    if context.ball.position is None:
+        return 0.0
+    return context.parameters.look_back_time + abs(_bearing(context)) / context.parameters.search_turn_speed
 
 
 def _look_back(context: Context) -> None:
-    context.stand()
+    """Look where the ball was, and turn there where the head alone reaches it badly."""
+    bearing = _bearing(context)
+    if abs(bearing) > context.parameters.glance_reach:
+        context.walk((0.0, 0.0, math.copysign(context.parameters.search_turn_speed, bearing)))
+    else:
+        context.stand()
     look_at_ball(context)
 
 
