@@ -19,9 +19,10 @@ def render(text: str) -> str:
     """Return the page with its generated parts made anew."""
     for name, part in (("graph", markdown_graph()), ("topics", markdown_tables())):
         block = f"<!-- {name} -->\n{part}<!-- /{name} -->"
-        text, count = re.subn(rf"<!-- {name} -->\n.*?<!-- /{name} -->", lambda _, new=block: new, text, flags=re.DOTALL)
-        if count != 1:
-            raise ValueError(f"{PAGE.name} holds {count} blocks <!-- {name} -->; expected 1")
+        pieces = re.split(rf"<!-- {name} -->\n.*?<!-- /{name} -->", text, flags=re.DOTALL)
+        if len(pieces) != 2:
+            raise ValueError(f"{PAGE.name} holds {len(pieces) - 1} blocks <!-- {name} -->; expected 1")
+        text = block.join(pieces)
     return text
 
 

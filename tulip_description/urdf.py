@@ -16,7 +16,7 @@ COLOURS: dict[str, tuple[float, float, float]] = {
 """Red, green and blue, 0 to 1, of the colour names of `Box`."""
 
 
-def build_urdf(robot: Robot, marker: str = "magenta", mount_frames: bool = True) -> str:
+def build_urdf(robot: Robot, marker: str = "cyan", mount_frames: bool = True) -> str:
     """Return the robot as URDF.
 
     Args:

@@ -23,8 +23,8 @@ class HeadNode(ComponentNode):
     def __init__(self) -> None:
         """Make the core and connect it."""
         super().__init__("head")
-        self._parameters = self.load(HeadParameters())
-        self._head = HeadMovement(self._parameters, load_robot())
+        self._settings = self.load(HeadParameters())
+        self._head = HeadMovement(self._settings, load_robot())
         self._command = HeadCommand(0, HeadMode.HOLD)
         self._last = -PERIOD  # stamp of the joint state answered last [ns]
         self._publisher = self.sender(topics.HEAD_JOINT_COMMAND)

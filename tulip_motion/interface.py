@@ -45,6 +45,7 @@ class Side(IntEnum):
 
     @property
     def other(self) -> Side:
+        """The other leg."""
         return Side.RIGHT if self is Side.LEFT else Side.LEFT
 
 

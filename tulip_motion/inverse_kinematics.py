@@ -79,14 +79,15 @@ def solve_3(matrix: Array, right: Array) -> Array:
     (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
     x, y, z = right.tolist()
     ei_fh, di_fg, dh_eg = e * i - f * h, d * i - f * g, d * h - e * g
-    determinant = a * ei_fh - b * di_fg + c * dh_eg
+    yi_fz, dz_yg, ez_yh = y * i - f * z, d * z - y * g, e * z - y * h
+    scale = 1.0 / (a * ei_fh - b * di_fg + c * dh_eg)
     return np.array(
         [
-            x * ei_fh - b * (y * i - f * z) + c * (y * h - e * z),
-            a * (y * i - f * z) - x * di_fg + c * (d * z - y * g),
-            a * (e * z - y * h) - b * (d * z - y * g) + x * dh_eg,
+            scale * (x * ei_fh - b * yi_fz - c * ez_yh),
+            scale * (a * yi_fz - x * di_fg + c * dz_yg),
+            scale * (a * ez_yh - b * dz_yg + x * dh_eg),
         ]
-    ) / determinant
+    )
 
 
 def inverse_of_base_jacobian(jacobian: Array) -> Array:
@@ -154,7 +155,8 @@ class InverseKinematics:
     @property
     def joint_positions(self) -> Array:
         """(12,) q_d [rad]."""
-        return self.configuration[7:]
+        positions: Array = self.configuration[7:]
+        return positions
 
     @property
     def joint_velocities(self) -> Array:

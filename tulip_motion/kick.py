@@ -9,7 +9,7 @@ import numpy as np
 from tulip_description.planar import Pose2D
 from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import FootMotion, Reference, sole_point, support_on
-from tulip_motion.interface import KickGoal, Side, Support
+from tulip_motion.interface import KickGoal, Support
 from tulip_motion.lipm import DcmPlan, time_constant
 from tulip_motion.parameters import MotionParameters
 

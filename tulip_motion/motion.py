@@ -43,9 +43,8 @@ HEIGHT_RATE = 0.1  # [m/s] the CoM is brought to its walking height without a je
 def with_fixed_head(robot: Robot) -> Robot:
     """Return the robot with its head joints fixed at zero, so that its model moves in the legs alone."""
     fixed = (0.0, 0.0, 0.0)
-    return replace(
-        robot, joints=tuple(replace(joint, axis=fixed) if joint.name in HEAD_JOINTS else joint for joint in robot.joints)
-    )
+    joints = (replace(joint, axis=fixed) if joint.name in HEAD_JOINTS else joint for joint in robot.joints)
+    return replace(robot, joints=tuple(joints))
 
 
 class Motion:
@@ -231,9 +230,9 @@ class Motion:
         """Tell the estimator where the feet stand, and count the way."""
         before = self._estimator.anchors
         if (feet[0].pose, feet[1].pose) != tuple(before):
-            moved = [math.hypot(foot.pose.x - old.x, foot.pose.y - old.y) for foot, old in zip(feet, before, strict=True)]
-            self._distance += 0.5 * sum(moved)
-            for foot in feet:
+            for foot, old in zip(feet, list(before), strict=True):
+                # The body moves half as far as a foot does.
+                self._distance += 0.5 * math.hypot(foot.pose.x - old.x, foot.pose.y - old.y)
                 self._estimator.anchor(foot)
 
     def _stabilize(self, estimate: Estimate, reference: Reference) -> Balance:

@@ -141,7 +141,11 @@ def session(
         rclpy.try_shutdown()
 
 
-def run(make_node: Callable[[], N], advance: Callable[[N, Callable[[float], None]], None] | None = None) -> NoReturn:
+def run(
+    make_node: Callable[[], N],
+    advance: Callable[[N, Callable[[float], None]], None] | None = None,
+    arguments: Sequence[str] | None = None,
+) -> NoReturn:
     """Run a node until SIGINT or SIGTERM, then end the process.
 
     Exit codes: 0 after a signal, 2 for bad input (message, no traceback); any other error ends with its traceback.
@@ -150,9 +154,10 @@ def run(make_node: Callable[[], N], advance: Callable[[N, Callable[[float], None
         make_node: Makes the node.
         advance: For a node with a loop of its own: called again and again with the node and a function that waits
             up to so many seconds [s] for messages and handles them. By default the node only handles messages.
+        arguments: As for `session`.
     """
     try:
-        with session(make_node) as (node, spin):
+        with session(make_node, arguments) as (node, spin):
             while rclpy.ok():
                 if advance is None:
                     spin(SPIN)

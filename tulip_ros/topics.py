@@ -19,6 +19,7 @@ from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, Imu, JointState
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
 from tulip_msgs.action import Kick
@@ -208,11 +209,27 @@ RESET = Service("simulation/reset", Reset, "driver", "begin anew with a scenario
 PLACE_BALL = Service("simulation/place_ball", PlaceBall, "driver", "put the ball somewhere")
 PUSH = Service("simulation/push", Push, "driver", "push the robot's trunk")
 SET_USER_COMMAND = Service("set_user_command", SetUserCommand, "user_input", "tell the robot what the user wants")
+START = Service("start", Trigger, "user_input", "obey the referee and play")
+STOP = Service("stop", Trigger, "user_input", "stop and stand, whatever the referee says")
+STAND = Service("stand", Trigger, "user_input", "stand up straight")
+GO_LIMP = Service("limp", Trigger, "user_input", "legs without stiffness")
 START_RECORDING = Service("start_recording", StartRecording, "recorder", "begin a recording")
 STOP_RECORDING = Service("stop_recording", StopRecording, "recorder", "end the recording")
 KICK = Service("kick", Kick, "motion", "action: kick once with one foot")
 
-SERVICES: tuple[Service, ...] = (RESET, PLACE_BALL, PUSH, SET_USER_COMMAND, START_RECORDING, STOP_RECORDING, KICK)
+SERVICES: tuple[Service, ...] = (
+    RESET,
+    PLACE_BALL,
+    PUSH,
+    START,
+    STOP,
+    STAND,
+    GO_LIMP,
+    SET_USER_COMMAND,
+    START_RECORDING,
+    STOP_RECORDING,
+    KICK,
+)
 
 
 def published_by(node_name: str) -> Iterator[Topic]:

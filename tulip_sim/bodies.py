@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_description.field import Field, Goal
+from tulip_description.keeper import KeeperPart, keeper_parts
 from tulip_description.robot import Box, Robot, realizable_inertia
 from tulip_description.urdf import build_urdf
-from tulip_sim.keeper import KEEPER_BOXES, Keeper
+from tulip_sim.keeper import Keeper
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.physics import pybullet
 
@@ -130,7 +131,7 @@ def add_ball(client: int, radius: float, carpet_friction: float, parameters: Wor
 
 def add_keeper(client: int, keeper: Keeper) -> int:
     """Add the keeper's figure. It has no mass, so nothing pushes it away; `move_keeper` moves it."""
-    shape = _boxes(client, [box for box in KEEPER_BOXES if box.collides])
+    shape = _boxes(client, [part for part in keeper_parts() if part.solid])
     body = _static(client, shape, friction=0.5)
     move_keeper(client, body, keeper, 0)
     return body
@@ -189,7 +190,7 @@ def add_robot(client: int, robot: Robot, scale: Array) -> tuple[int, dict[str, i
     return body, index
 
 
-def _boxes(client: int, boxes: Iterable[Box]) -> int:
+def _boxes(client: int, boxes: Iterable[Box | KeeperPart]) -> int:
     found = list(boxes)
     return int(
         pybullet.createCollisionShapeArray(

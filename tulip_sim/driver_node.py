@@ -87,7 +87,7 @@ class DriverNode(ComponentNode):
     def __init__(self) -> None:
         """Make the world and connect it."""
         super().__init__("driver")
-        p = self._parameters = self.load(DriverNodeParameters())
+        p = self._settings = self.load(DriverNodeParameters())
         self._field, self._robot, self._lens = load_field(), load_robot(), head_camera_lens()
         self._cells = np.array([foot.cells for foot in self._robot.feet])
         self._camera = CameraRenderer(p.pictures, self._field, self._robot, self._lens)
@@ -114,7 +114,7 @@ class DriverNode(ComponentNode):
         self._begin(p.scenario, p.seed)
 
     def _begin(self, scenario: str, seed: int) -> None:
-        p = self._parameters
+        p = self._settings
         self._scenario_name = scenario
         rng = np.random.default_rng(seed)
         self._world = World(make_scenario(scenario, rng, self._field), p.world, seed, self._field, self._robot)
@@ -130,7 +130,7 @@ class DriverNode(ComponentNode):
 
     def _await_nodes(self, spin: Callable[[float], None]) -> None:
         """Wait until the nodes of `wait_for` are in the graph, so that time begins with a whole robot."""
-        p, own = self._parameters, self.get_namespace()
+        p, own = self._settings, self.get_namespace()
         begin = time.monotonic()
         missing = set(p.wait_for)
         while missing and time.monotonic() - begin < p.start_bound:
@@ -167,7 +167,7 @@ class DriverNode(ComponentNode):
         if self._tick % SLOW_TICKS == 0:
             self._clock_sender.publish(Clock(clock=to_message(truth.stamp)))
             self._truth.publish(truth_to_message(truth, self._referee))
-        if self._parameters.camera and self._tick % CAMERA_TICKS == 0:
+        if self._settings.camera and self._tick % CAMERA_TICKS == 0:
             picture = self._camera.render(truth, self._camera_rng)
             self._pictures.publish(picture_to_message(picture, truth.stamp))
             if self._compressed.get_subscription_count() > 0:
@@ -183,7 +183,7 @@ class DriverNode(ComponentNode):
 
     def _await_answer(self, newest: tuple[JointState, Imu, FootForces], spin: Callable[[float], None]) -> None:
         """Wait for the answer to the sensors of the tick before; the newest ones are already out."""
-        p = self._parameters
+        p = self._settings
         begin = time.monotonic()
         bound = p.answer_bound if self._started else p.start_bound
         repeat = begin + REPEAT
@@ -206,7 +206,7 @@ class DriverNode(ComponentNode):
 
     def _on_legs(self, message: JointCommandMessage) -> None:
         self._answer = message
-        if not self._waits and self._parameters.mode == "sync":
+        if not self._waits and self._settings.mode == "sync":
             self._waits = True
             self._paced_from = (time.monotonic(), self._world.stamp)
 
@@ -220,7 +220,7 @@ class DriverNode(ComponentNode):
 
     def _pace(self, spin: Callable[[float], None]) -> None:
         """Keep to the wall clock: never faster than `speed`, and without catching up when it was slower."""
-        speed = self._parameters.speed if self._waits else 1.0
+        speed = self._settings.speed if self._waits else 1.0
         if speed == 0.0:
             return
         wall, stamp = self._paced_from

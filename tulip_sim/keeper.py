@@ -6,20 +6,6 @@ import math
 from dataclasses import dataclass
 
 from tulip_description.planar import Pose2D
-from tulip_description.robot import Box
-
-KEEPER_BOXES = (
-    Box((0.22, 0.15, 0.06), (0.04, 0.14, 0.03), "black", True),
-    Box((0.22, 0.15, 0.06), (0.04, -0.14, 0.03), "black", True),
-    Box((0.11, 0.11, 0.58), (0.0, 0.14, 0.35), "grey", True),
-    Box((0.11, 0.11, 0.58), (0.0, -0.14, 0.35), "grey", True),
-    Box((0.18, 0.40, 0.46), (0.0, 0.0, 0.87), "grey", True),
-    Box((0.08, 0.08, 0.44), (0.0, 0.26, 0.86), "grey", True),
-    Box((0.08, 0.08, 0.44), (0.0, -0.26, 0.86), "grey", True),
-    Box((0.14, 0.14, 0.18), (0.0, 0.0, 1.21), "grey", True),
-    Box((0.20, 0.30, 0.10), (0.0, 0.0, 0.98), "marker", False),
-)
-"""An upright, robot-like body of 1.3 m; its frame lies on the ground between the feet, x where it faces."""
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,7 @@ from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParamete
 from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
 
 Picture = NDArray[np.uint8]
+Vector = Sequence[float] | NDArray[np.float64]
 Listener = Callable[[str, int, object], None]
 """Is told everything that passes between components: topic name, stamp [ns], object."""
 
@@ -205,7 +206,7 @@ def robot_pose(truth: Truth) -> Pose2D:
     return planar_pose(truth.base_position, truth.base_orientation)
 
 
-def planar_pose(position: Sequence[float] | NDArray[np.float64], orientation: Sequence[float] | NDArray[np.float64]) -> Pose2D:
+def planar_pose(position: Vector, orientation: Vector) -> Pose2D:
     """Return the pose on the ground of a position (x, y, ...) [m] and a quaternion x, y, z, w."""
     x, y, z, w = orientation
     yaw = float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))

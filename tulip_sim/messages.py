@@ -29,7 +29,7 @@ def picture_to_message(picture: NDArray[np.uint8], stamp: int) -> Image:
     message.step = 3 * width
     # Assigning an array('B') costs 0.05 ms; rosidl checks a numpy array element by element for 97 ms.
     data = array.array("B")
-    data.frombytes(memoryview(np.ascontiguousarray(picture)).cast("B"))
+    data.frombytes(np.ascontiguousarray(picture).data.cast("B"))
     message.data = data
     return message
 
@@ -37,7 +37,9 @@ def picture_to_message(picture: NDArray[np.uint8], stamp: int) -> Image:
 def jpeg_to_message(picture: NDArray[np.uint8], stamp: int) -> CompressedImage:
     """Return a (H, W, 3) BGR picture as a compressed message: a fifteenth of the size, for recordings and viewers."""
     _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    return CompressedImage(header=header(stamp, frames.CAMERA_OPTICAL), format="jpeg", data=array.array("B", data.tobytes()))
+    message = CompressedImage(header=header(stamp, frames.CAMERA_OPTICAL), format="jpeg")
+    message.data = array.array("B", data.tobytes())
+    return message
 
 
 def lens_to_message(lens: Lens, stamp: int) -> CameraInfo:

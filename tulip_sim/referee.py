@@ -32,7 +32,7 @@ class RefereeParameters:
     lying_tilt: float = 1.0  # [rad] of the trunk; no gait leans half as far
     team_number: int = 25
     player_number: int = 1
-    team_colour: TeamColour = TeamColour.MAGENTA
+    team_colour: TeamColour = TeamColour.CYAN
     opponent_number: int = 12
 
     def __post_init__(self) -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from std_srvs.srv import Trigger
-
 from tulip_ros import topics
 from tulip_ros.errors import BadInputError
 from tulip_ros.run import ComponentNode, run
@@ -15,10 +13,10 @@ from tulip_strategy.messages import user_command_to_message
 from tulip_strategy.user_input import UserInput, UserInputParameters
 
 TRIGGERS = {
-    topics.Service("start", Trigger, "user_input", "obey the referee and play"): UserRequest.PLAY,
-    topics.Service("stop", Trigger, "user_input", "stop and stand, whatever the referee says"): UserRequest.STOP,
-    topics.Service("stand", Trigger, "user_input", "stand up straight"): UserRequest.STAND,
-    topics.Service("limp", Trigger, "user_input", "legs without stiffness"): UserRequest.LIMP,
+    topics.START: UserRequest.PLAY,
+    topics.STOP: UserRequest.STOP,
+    topics.STAND: UserRequest.STAND,
+    topics.GO_LIMP: UserRequest.LIMP,
 }
 """Services without arguments, for the wishes that need none, and what each asks for."""
 

@@ -48,7 +48,7 @@ class CrossingParameters:
     farthest: float = 6.5  # [m]
     square: float = math.radians(16.0)
     extension: float = 0.30
-    least_arm: float = 0.65
+    least_arm: float = 0.8  # five of six samples: the centre circle bends away from its tangent
     circle_radius: float = 0.75
     mark_size: float = 0.10
     mark_range: float = 4.0

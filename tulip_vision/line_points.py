@@ -23,8 +23,8 @@ SLANTED = 1.6
 """Thickness of a line that runs at up to 50 deg to its cut, over that of one at a right angle."""
 MARGIN = 2.0
 """[px] blur on both sides."""
-SLIMMEST = 0.25
-"""Least thickness of a line over the largest: less than half of what is expected at a right angle."""
+SLIMMEST = 0.4
+"""Least thickness of a line over the largest: two thirds of what is expected at a right angle."""
 
 
 @dataclass(frozen=True)

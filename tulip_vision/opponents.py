@@ -51,7 +51,7 @@ class OpponentParameters:
     smallest_marker: float = 0.004  # [m^2] an arm's marker seen from the front, half hidden
     largest_marker: float = 0.25  # [m^2]
     half_width: float = 0.30
-    depth: float = 0.10
+    depth: float = 0.17  # nearest corner of two feet, 0.22 m long and 0.14 m to either side
     depth_spread: float = 0.07  # [m] feet of 0.2 m seen from any side
     farthest: float = 11.0  # [m]
 
@@ -148,8 +148,10 @@ def _examine(
         if marker.area * (pixel * farthest) ** 2 < parameters.smallest_marker:
             return "too high above the ground"
     width = marker.left - marker.right
-    # First look: the marker's own width and half of it on either side is enough to hit a foot or a leg.
-    low = _contact(marker, 1.0 * width + 2.0 * pixel, segmentation, view, pixel)
+    # First look: as wide as the markers at the same height together, which is enough to hit a foot or a leg.
+    group = _joined(marker, markers, 2.0 * (marker.high - marker.low))
+    half = max(0.6 * (group.left - group.right), width) + 2.0 * pixel
+    low = _contact(group, min(half, NEAR_REACH), segmentation, view, pixel)
     if low is None:
         return "no body that stands on the carpet below the marker"
     if math.isnan(low):
@@ -158,7 +160,7 @@ def _examine(
         return "stands beyond the carpet"
     # Second look, with the width that a body has at this range.
     distance = view.height / math.tan(-low)
-    again = _contact(marker, parameters.half_width / distance, segmentation, view, pixel)
+    again = _contact(group, parameters.half_width / distance, segmentation, view, pixel)
     if again is not None and math.isnan(again):
         return _without_feet(marker, markers, view, parameters)
     low = low if again is None else again
@@ -171,7 +173,7 @@ def _examine(
     area = marker.area * (pixel * math.hypot(distance, view.height)) ** 2
     if not parameters.smallest_marker <= area <= parameters.largest_marker:
         return f"marker of {area:.3f} m^2"
-    marker = _joined(marker, markers, 1.2 * parameters.half_width / distance)
+    marker = _joined(marker, markers, 2.0 * parameters.half_width / distance)
     azimuth = _middle(marker, low, distance, segmentation, view, parameters)
     elevation = -math.atan2(view.height, distance + parameters.depth)
     spread_azimuth, spread_elevation = view.spreads(direction_of(azimuth, elevation), 2.0)
@@ -199,8 +201,16 @@ def _without_feet(marker: _Marker, markers: list[_Marker], view: View, parameter
 
 
 def _joined(marker: _Marker, markers: list[_Marker], reach: float) -> _Marker:
-    """Return a marker together with the others of the same opponent: those within `reach` [rad] of it."""
-    same = [other for other in markers if _angle(other.azimuth, marker.azimuth) < reach]
+    """Return a marker together with the others of the same opponent.
+
+    Those are the ones within `reach` [rad] to either side that are at the same height.
+    """
+    same = [
+        other
+        for other in markers
+        if other is marker
+        or (_angle(other.azimuth, marker.azimuth) < reach and other.low < marker.high and other.high > marker.low)
+    ]
     return replace(
         marker,
         left=max(other.left for other in same),

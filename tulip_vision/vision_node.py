@@ -30,7 +30,7 @@ class VisionNode(ComponentNode):
         """Make the pose buffer and connect the topics; vision itself needs the lens and is made when it comes."""
         super().__init__("vision")
         cv2.setNumThreads(1)  # the robot's other nodes need the other cores
-        self._parameters = self.load(VisionParameters())
+        self._settings = self.load(VisionParameters())
         robot = load_robot()
         self._poses = PoseBuffer(
             PoseBufferParameters(), lambda height, turn, pan, tilt: camera_in_footprint(robot, height, turn, pan, tilt)
@@ -52,7 +52,7 @@ class VisionNode(ComponentNode):
             return
         if self._vision is None or lens.to_camera_info() != self._vision.lens.to_camera_info():
             lens.ray_table()  # 20 ms now instead of at the first picture
-            self._vision = Vision(self._parameters, lens)
+            self._vision = Vision(self._settings, lens)
 
     def _on_odometry(self, message: Odometry) -> None:
         pose = message.pose.pose

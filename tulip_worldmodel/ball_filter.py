@@ -6,7 +6,6 @@ where the filter cannot explain it, the filter starts anew there, with the veloc
 
 from __future__ import annotations
 
-import copy
 import math
 from dataclasses import dataclass, fields
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from tulip_vision.features import Feature, FeatureClass, Features
 from tulip_worldmodel.mahalanobis import gate
-from tulip_worldmodel.moving_point import MovingPoint
+from tulip_worldmodel.moving_point import MovingPoint, PointEstimate, PointMotion, position_noise
 from tulip_worldmodel.odometry_history import Increment
 from tulip_worldmodel.rejected import Rejected
 from tulip_worldmodel.sighting import Observer, Sighting, in_view
@@ -110,15 +109,13 @@ class BallFilter:
         """
         if self._point is None:
             return
-        roll_on(self._point, self._parameters, moved, observer_position, self._velocity_noise())
+        self._point.predict(self._rolling(self._point, moved, observer_position))
         if math.sqrt(np.trace(self._point.covariance[:2, :2])) > self._parameters.longest_range / 2.0:
             self._forget()
 
-    def extrapolated(self, moved: Increment, observer_position: Array) -> MovingPoint:
+    def extrapolated(self, moved: Increment, observer_position: Array) -> PointEstimate:
         """Return the known ball after a movement as in `predict`, without changing the filter."""
-        point = copy.deepcopy(self.point)
-        roll_on(point, self._parameters, moved, observer_position, self._velocity_noise())
-        return point
+        return self.point.predicted(self._rolling(self.point, moved, observer_position))
 
     def update(self, features: Features, observer: Observer, since_last: float, occluded: bool) -> tuple[Rejected, ...]:
         """Use one picture, with the ball predicted to its stamp.
@@ -256,22 +253,23 @@ class BallFilter:
         share = min(1.0, max(0.0, (self._restlessness - 1.5) / 1.5))
         return p.quiet_velocity_noise + share * (p.restless_velocity_noise - p.quiet_velocity_noise)
 
+    def _rolling(self, point: MovingPoint, moved: Increment, observer_position: Array) -> PointMotion:
+        """Return how a ball rolls: it loses `rolling_deceleration` of its speed each second until it stands.
 
-def roll_on(
-    point: MovingPoint, parameters: BallParameters, moved: Increment, observer_position: Array, velocity_noise: float
-) -> None:
-    """Predict a rolling ball: it loses `rolling_deceleration` of its speed each second until it stands.
-
-    The speed that counts is the root mean square over its uncertainty, so that a ball of unknown speed is not
-    taken for a standing one.
-    """
-    p = parameters
-    covariance = point.covariance
-    speed = math.sqrt(float(point.state[2:] @ point.state[2:] + np.trace(covariance[2:, 2:])))
-    keep = max(0.0, 1.0 - p.rolling_deceleration * moved.duration / max(speed, 1e-6))
-    offset = point.state[:2] - observer_position
-    across = np.array([-offset[1], offset[0]])
-    noise = np.eye(2) * (
-        p.position_noise_per_second**2 * moved.duration + p.position_noise_per_metre**2 * moved.distance
-    ) + np.outer(across, across) * (p.position_noise_per_radian**2 * moved.turned)
-    point.predict(moved.duration, keep, noise, velocity_noise**2 * moved.duration)
+        The speed that counts is the root mean square over its uncertainty, so that a ball of unknown speed is not
+        taken for a standing one.
+        """
+        p = self._parameters
+        x, y, velocity_x, velocity_y = point.state.tolist()
+        covariance = point.covariance
+        speed = math.sqrt(velocity_x**2 + velocity_y**2 + float(covariance[2, 2] + covariance[3, 3]))
+        return PointMotion(
+            moved.duration,
+            max(0.0, 1.0 - p.rolling_deceleration * moved.duration / max(speed, 1e-6)),
+            position_noise(
+                (x - float(observer_position[0]), y - float(observer_position[1])),
+                p.position_noise_per_second**2 * moved.duration + p.position_noise_per_metre**2 * moved.distance,
+                p.position_noise_per_radian**2 * moved.turned,
+            ),
+            self._velocity_noise() ** 2 * moved.duration,
+        )

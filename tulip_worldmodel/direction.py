@@ -32,13 +32,17 @@ def directions(offsets: Array) -> tuple[Array, Array]:
     """
     x, y, z = offsets[:, 0], offsets[:, 1], offsets[:, 2]
     ground = np.maximum(np.hypot(x, y), 1e-6)
-    whole = ground**2 + z**2
-    angles = np.column_stack((np.arctan2(y, x), np.arctan2(z, ground)))
+    ground_squared = ground**2
+    whole = ground_squared + z**2
+    angles = np.empty((len(offsets), 2))
+    angles[:, 0] = np.arctan2(y, x)
+    angles[:, 1] = np.arctan2(z, ground)
+    sink = -z / (ground * whole)
     jacobian = np.zeros((len(offsets), 2, 3))
-    jacobian[:, 0, 0] = -y / ground**2
-    jacobian[:, 0, 1] = x / ground**2
-    jacobian[:, 1, 0] = -x * z / (ground * whole)
-    jacobian[:, 1, 1] = -y * z / (ground * whole)
+    jacobian[:, 0, 0] = -y / ground_squared
+    jacobian[:, 0, 1] = x / ground_squared
+    jacobian[:, 1, 0] = x * sink
+    jacobian[:, 1, 1] = y * sink
     jacobian[:, 1, 2] = ground / whole
     return angles, jacobian
 
@@ -54,10 +58,11 @@ def rays(angles: Array) -> tuple[Array, Array]:
     """
     azimuth, elevation = angles[:, 0], angles[:, 1]
     ca, sa, ce, se = np.cos(azimuth), np.sin(azimuth), np.cos(elevation), np.sin(elevation)
-    unit = np.column_stack((ce * ca, ce * sa, se))
+    unit = np.empty((len(angles), 3))
+    unit[:, 0], unit[:, 1], unit[:, 2] = ce * ca, ce * sa, se
     jacobian = np.zeros((len(angles), 3, 2))
-    jacobian[:, 0, 0] = -ce * sa
-    jacobian[:, 1, 0] = ce * ca
+    jacobian[:, 0, 0] = -unit[:, 1]
+    jacobian[:, 1, 0] = unit[:, 0]
     jacobian[:, 0, 1] = -se * ca
     jacobian[:, 1, 1] = -se * sa
     jacobian[:, 2, 1] = ce
@@ -75,11 +80,10 @@ def meet_plane(unit_rays: Array, camera_position: Array, height: float = 0.0) ->
     Returns:
         (n, 2) points [m], and (n, 2, 3) their derivatives by the rays.
     """
-    drop = height - camera_position[2]
-    x, y, z = unit_rays[:, 0], unit_rays[:, 1], unit_rays[:, 2]
-    points = camera_position[:2] + drop * unit_rays[:, :2] / z[:, None]
+    z = unit_rays[:, 2]
+    reach = (height - camera_position[2]) / z  # factor by which a ray is to be stretched
+    from_camera = reach[:, None] * unit_rays[:, :2]
     jacobian = np.zeros((len(unit_rays), 2, 3))
-    jacobian[:, 0, 0] = jacobian[:, 1, 1] = drop / z
-    jacobian[:, 0, 2] = -drop * x / z**2
-    jacobian[:, 1, 2] = -drop * y / z**2
-    return points, jacobian
+    jacobian[:, 0, 0] = jacobian[:, 1, 1] = reach
+    jacobian[:, :, 2] = -from_camera / z[:, None]
+    return camera_position[:2] + from_camera, jacobian

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_vision.features import Feature
-from tulip_worldmodel.mahalanobis import gate
+from tulip_worldmodel.mahalanobis import distances_and_determinants, gate
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -69,17 +69,29 @@ class _Linearized:
     innovations: Array
     jacobians: Array
     noises: Array
+    gate: float
     cost_true: float
     cost_false: float
 
 
 @dataclass(frozen=True)
 class _Hypothesis:
+    """Choices for the features so far, and the state after them as an offset from the prior."""
+
     cost: float
     state: Array
     covariance: Array
     choices: tuple[int, ...]
     taken: frozenset[object]
+
+
+@dataclass(frozen=True)
+class _Child:
+    """A hypothesis continued with one choice: a position among the feature's candidates, or FALSE."""
+
+    cost: float
+    parent: _Hypothesis
+    position: int
 
 
 def associate(
@@ -108,11 +120,13 @@ def associate(
     rejected: dict[int, str] = {}
     usable: list[_Linearized] = []
     for index, observation in enumerate(observations):
-        near = _inside_gate(state, covariance, observation, gate_probability)
+        possible = observation.possible(state)
+        near = _inside_gate(state, covariance, observation, possible, gate_probability) if len(possible) else None
         if near is None:
             rejected[index] = "no landmark inside the gate"
             continue
         candidates, innovations, jacobians, noises = near
+        dimension = innovations.shape[1]
         usable.append(
             _Linearized(
                 index,
@@ -121,71 +135,64 @@ def associate(
                 innovations,
                 jacobians,
                 noises,
-                innovations.shape[1] * math.log(2.0 * math.pi) - 2.0 * math.log(1.0 - false_rates[index]),
+                gate(gate_probability, dimension),
+                dimension * math.log(2.0 * math.pi) - 2.0 * math.log(1.0 - false_rates[index]),
                 -2.0 * math.log(false_rates[index] * clutter[index]),
             )
         )
-    usable.sort(key=lambda item: (len(item.candidates), float(np.trace(item.noises[0]))))
+    usable.sort(key=lambda item: (len(item.candidates), float(item.noises[0].trace())))
     gap = 2.0 * math.log(odds)
-    gates = {rows: gate(gate_probability, rows) for rows in (1, 2)}
     hypotheses = [_Hypothesis(0.0, np.zeros_like(state), covariance, (), frozenset())]
     for item in usable:
-        grown = [child for parent in hypotheses for child in _children(parent, item, gates)]
-        grown.sort(key=lambda hypothesis: hypothesis.cost)
-        limit = grown[0].cost + 2.0 * gap  # later features may turn the order, not by more than this in practice
-        hypotheses = [child for child in grown[:WIDTH] if child.cost <= limit]
+        children = [child for parent in hypotheses for child in _children(parent, item)]
+        children.sort(key=lambda child: child.cost)
+        limit = children[0].cost + 2.0 * gap  # later features may turn the order, not by more than this in practice
+        hypotheses = [_grown(child, item) for child in children[:WIDTH] if child.cost <= limit]
     return _verdicts(len(observations), usable, hypotheses, rejected, gap)
 
 
 def _inside_gate(
-    state: Array, covariance: Array, observation: Observation, probability: float
+    state: Array, covariance: Array, observation: Observation, possible: Indices, probability: float
 ) -> tuple[list[int], Array, Array, Array] | None:
-    possible = observation.possible(state)
-    if not len(possible):
-        return None
     innovations, jacobians, noises = observation.linearize(state, possible)
-    spread = jacobians @ covariance @ jacobians.transpose(0, 2, 1) + noises
-    distances = np.einsum("km,km->k", innovations, np.linalg.solve(spread, innovations[:, :, None])[:, :, 0])
+    spreads = jacobians @ covariance @ jacobians.transpose(0, 2, 1) + noises
+    distances, _ = distances_and_determinants(innovations, spreads)
     near = np.flatnonzero(distances <= gate(probability, innovations.shape[1]))
     if not len(near):
         return None
-    return [int(candidate) for candidate in possible[near]], innovations[near], jacobians[near], noises[near]
+    return possible[near].tolist(), innovations[near], jacobians[near], noises[near]
 
 
-def _children(parent: _Hypothesis, item: _Linearized, gates: dict[int, float]) -> list[_Hypothesis]:
-    """Continue one hypothesis with every choice for one feature; states are offsets from the prior."""
-    children = [
-        _Hypothesis(
-            parent.cost + item.cost_false,
-            parent.state,
-            parent.covariance,
-            (*parent.choices, FALSE),
-            parent.taken,
-        )
-    ]
-    for position, candidate in enumerate(item.candidates):
+def _children(parent: _Hypothesis, item: _Linearized) -> list[_Child]:
+    """Continue one hypothesis with every choice for one feature."""
+    jacobians = item.jacobians
+    innovations = item.innovations - jacobians @ parent.state
+    spreads = jacobians @ parent.covariance @ jacobians.transpose(0, 2, 1) + item.noises
+    distances, determinants = distances_and_determinants(innovations, spreads)
+    costs = distances + np.log(determinants) + (parent.cost + item.cost_true)
+    children = [_Child(parent.cost + item.cost_false, parent, FALSE)]
+    for position, (cost, distance) in enumerate(zip(costs.tolist(), distances.tolist(), strict=True)):
         key = item.keys[position]
-        if key is not None and key in parent.taken:
-            continue
-        jacobian = item.jacobians[position]
-        innovation = item.innovations[position] - jacobian @ parent.state
-        gain_part = parent.covariance @ jacobian.T
-        spread = jacobian @ gain_part + item.noises[position]
-        inverse = np.linalg.inv(spread)
-        distance = float(innovation @ inverse @ innovation)
-        if distance > gates[len(innovation)]:
-            continue
-        gain = gain_part @ inverse
-        children.append(
-            _Hypothesis(
-                parent.cost + distance + math.log(float(np.linalg.det(spread))) + item.cost_true,
-                parent.state + gain @ innovation,
-                parent.covariance - gain @ gain_part.T,
-                (*parent.choices, candidate),
-                parent.taken if key is None else parent.taken | {key},
-            )
-        )
+        if distance <= item.gate and (key is None or key not in parent.taken):
+            children.append(_Child(cost, parent, position))
     return children
+
+
+def _grown(child: _Child, item: _Linearized) -> _Hypothesis:
+    """Return the hypothesis that a child stands for, with the state corrected by its choice."""
+    parent, position = child.parent, child.position
+    if position == FALSE:
+        return _Hypothesis(child.cost, parent.state, parent.covariance, (*parent.choices, FALSE), parent.taken)
+    jacobian, key = item.jacobians[position], item.keys[position]
+    gain_part = parent.covariance @ jacobian.T
+    gain = gain_part @ np.linalg.inv(jacobian @ gain_part + item.noises[position])
+    return _Hypothesis(
+        child.cost,
+        parent.state + gain @ (item.innovations[position] - jacobian @ parent.state),
+        parent.covariance - gain @ gain_part.T,
+        (*parent.choices, item.candidates[position]),
+        parent.taken if key is None else parent.taken | {key},
+    )
 
 
 def _verdicts(

@@ -8,6 +8,7 @@ drift [rad/s] that dead reckoning misses. An observed ray is the true offset o t
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,41 @@ POLES = {
 
 
 @dataclass(frozen=True)
+class Lines:
+    """Straight lines of the field, in map.
+
+    Attributes:
+        directions: (n,) from start to end [rad].
+        lengths: (n,) [m].
+        along: (n, 2) unit vectors from start to end.
+        across: (n, 2) unit vectors to the left of `along`.
+        starts: (n, 2) the starts, each along and across its own line [m].
+    """
+
+    directions: Array
+    lengths: Array
+    along: Array
+    across: Array
+    starts: Array
+
+    def __getitem__(self, chosen: Indices) -> Lines:
+        """Return some of the lines."""
+        return Lines(
+            self.directions[chosen], self.lengths[chosen], self.along[chosen], self.across[chosen], self.starts[chosen]
+        )
+
+
+def lines_of(segments: Sequence[LineSegment]) -> Lines:
+    """Return the lines of segments, in their order."""
+    directions = np.array([segment.direction for segment in segments])
+    along = np.column_stack((np.cos(directions), np.sin(directions)))
+    across = np.column_stack((-along[:, 1], along[:, 0]))
+    starts = np.array([segment.start for segment in segments], dtype=np.float64).reshape(-1, 2)
+    starts_by_line = np.column_stack(((along * starts).sum(axis=1), (across * starts).sum(axis=1)))
+    return Lines(directions, np.array([segment.length for segment in segments]), along, across, starts_by_line)
+
+
+@dataclass(frozen=True)
 class Landmarks:
     """Places on the field that a feature may belong to.
 
@@ -41,7 +77,7 @@ class Landmarks:
     """
 
     points: dict[FeatureClass, Array]
-    lines: tuple[LineSegment, ...]
+    lines: Lines
 
 
 def landmarks_of(field: Field) -> Landmarks:
@@ -56,7 +92,7 @@ def landmarks_of(field: Field) -> Landmarks:
         points[kind] = [(pole.x, pole.y) for pole in field.poles if pole.colours == colours]
     return Landmarks(
         {kind: np.array(places, dtype=np.float64).reshape(-1, 2) for kind, places in points.items()},
-        field.line_segments,
+        lines_of(field.line_segments),
     )
 
 
@@ -92,63 +128,98 @@ def point_directions(state: Array, points: Array, camera_position: Array) -> tup
     return angles, by_offset @ by_state
 
 
-def line_misfit(
-    state: Array, ends: Array, line: LineSegment, camera_position: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Return how an observed piece of line lies relative to a line of the field.
+@dataclass(frozen=True)
+class LineMisfits:
+    """How an observed piece of line lies relative to n lines of the field.
 
-    Args:
-        state: (6,) see the module.
-        ends: (2, 2) azimuth and elevation of both ends [rad], below the horizon.
-        line: The line of the field.
-        camera_position: (3,) optical centre in base_footprint [m].
-
-    Returns:
-        (2,) angle between the two [rad, in [-pi/2, pi/2)] and distance of the piece's middle from the line [m];
-        (2, 6) their derivatives by the state; (2, 4) by azimuth and elevation of the first and second end;
-        (2,) where both ends lie along the line, from its start [m].
+    Attributes:
+        misfits: (n, 2) angle between the two [rad, in [-pi/2, pi/2)] and distance of the piece's middle from the
+            line [m].
+        by_state: (n, 2, 6) derivatives of the misfits by the state.
+        by_angles: (n, 2, 4) by azimuth and elevation of the first and the second end.
+        along: (n, 2) where both ends lie along the line, from its start [m].
     """
-    seen, ray_by_angles = rays(ends)
+
+    misfits: Array
+    by_state: Array
+    by_angles: Array
+    along: Array
+
+
+class LinePiece:
+    """An observed piece of line, with what does not depend on the state."""
+
+    def __init__(self, ends: Array, camera_position: Array) -> None:
+        """Prepare a piece.
+
+        Args:
+            ends: (2, 2) azimuth and elevation of both ends [rad], below the horizon.
+            camera_position: (3,) optical centre in base_footprint [m].
+        """
+        self._camera_position = camera_position
+        self._rays, self._rays_by_angles = rays(ends)
+        self._rays_by_tilt = np.zeros((2, 3, 2))
+        self._rays_by_tilt[:, 1, 0] = self._rays[:, 2]
+        self._rays_by_tilt[:, 2, 0] = -self._rays[:, 1]
+        self._rays_by_tilt[:, 0, 1] = -self._rays[:, 2]
+        self._rays_by_tilt[:, 2, 1] = self._rays[:, 0]
+
+    def ground_ends(self) -> Array:
+        """Return (2, 2) both ends on the ground in base_footprint [m], without tilt."""
+        return meet_plane(self._rays, self._camera_position)[0]
+
+    def along(self, state: Array, lines: Lines) -> Array:
+        """Return where both ends lie along lines, (n, 2) from their starts [m]."""
+        points = meet_plane(self._rays @ _untilt(state).T, self._camera_position)[0]
+        in_map = points @ _rotation(state[2]).T + state[:2]
+        return np.asarray(lines.along @ in_map.T - lines.starts[:, :1])
+
+    def misfits(self, state: Array, lines: Lines) -> LineMisfits:
+        """Return how the piece lies relative to lines, seen from a state (6,)."""
+        untilt = _untilt(state)
+        points, points_by_rays = meet_plane(self._rays @ untilt.T, self._camera_position)
+        points_by_tilt = points_by_rays @ self._rays_by_tilt
+        points_by_angles = points_by_rays @ (untilt @ self._rays_by_angles)
+        rotation = _rotation(state[2])
+        in_map = points @ rotation.T + state[:2]
+        piece = points[1] - points[0]
+        middle = 0.5 * (points[0] + points[1])
+        across = lines.across @ rotation  # in base_footprint
+
+        count = len(across)
+        misfits = np.empty((count, 2))
+        misfits[:, 0] = half_turn(math.atan2(piece[1], piece[0]) + state[2] - lines.directions)
+        misfits[:, 1] = lines.across @ (0.5 * (in_map[0] + in_map[1])) - lines.starts[:, 1]
+        turn = np.array([-piece[1], piece[0]]) / max(float(piece @ piece), 1e-6)  # angle by the second end
+        by_state = np.zeros((count, 2, 6))
+        by_state[:, 0, 2] = 1.0
+        by_state[:, 0, 3:5] = turn @ (points_by_tilt[1] - points_by_tilt[0])
+        by_state[:, 1, :2] = lines.across
+        by_state[:, 1, 2] = across @ np.array([-middle[1], middle[0]])
+        by_state[:, 1, 3:5] = across @ (0.5 * (points_by_tilt[0] + points_by_tilt[1]))
+        by_angles = np.empty((count, 2, 4))
+        by_angles[:, 0, :2] = -turn @ points_by_angles[0]
+        by_angles[:, 0, 2:] = turn @ points_by_angles[1]
+        by_angles[:, 1, :2] = across @ (0.5 * points_by_angles[0])
+        by_angles[:, 1, 2:] = across @ (0.5 * points_by_angles[1])
+        return LineMisfits(misfits, by_state, by_angles, lines.along @ in_map.T - lines.starts[:, :1])
+
+
+def _untilt(state: Array) -> Array:
+    """Return (3, 3) that turns an observed ray back by the camera's tilt."""
     roll, pitch = state[3], state[4]
-    untilt = np.array([[1.0, 0.0, -pitch], [0.0, 1.0, roll], [pitch, -roll, 1.0]])
-    level = seen @ untilt.T
-    points, point_by_ray = meet_plane(level, camera_position)
-    ray_by_tilt = np.zeros((2, 3, 2))
-    ray_by_tilt[:, 1, 0] = seen[:, 2]
-    ray_by_tilt[:, 2, 0] = -seen[:, 1]
-    ray_by_tilt[:, 0, 1] = -seen[:, 2]
-    ray_by_tilt[:, 2, 1] = seen[:, 0]
-    point_by_tilt = point_by_ray @ ray_by_tilt
-    point_by_angles = point_by_ray @ untilt @ ray_by_angles
-
-    c, s = math.cos(state[2]), math.sin(state[2])
-    rotation = np.array([[c, -s], [s, c]])
-    direction = line.direction
-    along = np.array([math.cos(direction), math.sin(direction)])
-    across = np.array([-along[1], along[0]])
-    in_map = points @ rotation.T + state[:2] - np.array(line.start)
-    piece = points[1] - points[0]
-    middle = points.mean(axis=0)
-    angle = math.atan2(piece[1], piece[0]) + state[2] - direction
-    misfit = np.array([half_turn(angle), across @ in_map.mean(axis=0)])
-
-    length_squared = max(float(piece @ piece), 1e-6)
-    by_end = np.empty((2, 2, 2))  # misfit by first and second point
-    by_end[0, 1] = np.array([-piece[1], piece[0]]) / length_squared
-    by_end[0, 0] = -by_end[0, 1]
-    by_end[1, :] = across @ rotation / 2.0
-    by_state = np.zeros((2, 6))
-    by_state[0, 2] = 1.0
-    by_state[1, :2] = across
-    by_state[1, 2] = across @ rotation @ np.array([-middle[1], middle[0]])
-    by_state[:, 3:5] = np.einsum("mep,ept->mt", by_end, point_by_tilt)
-    by_angles = np.einsum("mep,epa->mea", by_end, point_by_angles).reshape(2, 4)
-    return misfit, by_state, by_angles, np.asarray(in_map @ along)
+    return np.array([[1.0, 0.0, -pitch], [0.0, 1.0, roll], [pitch, -roll, 1.0]])
 
 
-def half_turn(angle: float) -> float:
-    """Return the direction of an undirected line [rad] brought into [-pi/2, pi/2)."""
-    return (angle + math.pi / 2.0) % math.pi - math.pi / 2.0
+def _rotation(yaw: float) -> Array:
+    """Return (2, 2) from base_footprint to map."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.array([[c, -s], [s, c]])
+
+
+def half_turn(angles: Array) -> Array:
+    """Return directions of undirected lines [rad] brought into [-pi/2, pi/2)."""
+    return np.asarray((angles + math.pi / 2.0) % math.pi - math.pi / 2.0)
 
 
 class PointObservation:
@@ -164,10 +235,12 @@ class PointObservation:
             spreads: Added to the feature's own: azimuth [rad], elevation [rad], place of the landmark [m].
         """
         self.feature = feature
-        self.count = len(points)
+        self._count = len(points)
         self._points = points
         self._camera_position = camera_position
-        self._spreads = spreads
+        azimuth_spread, elevation_spread, self._landmark_spread = spreads
+        self._azimuth_variance = feature.azimuth_spread**2 + azimuth_spread**2
+        self._elevation_variance = feature.elevation_spread**2 + elevation_spread**2
         self._rows = 1 if math.isnan(feature.elevation) else 2
         self._seen = np.array([feature.azimuth, feature.elevation])[: self._rows]
 
@@ -177,26 +250,19 @@ class PointObservation:
 
     def possible(self, state: Array) -> Indices:
         """Return the candidates worth a look: all of them, (n,)."""
-        return np.arange(self.count)
+        return np.arange(self._count)
 
     def linearize(self, state: Array, candidates: Indices) -> tuple[Array, Array, Array]:
         """Return innovations (k, m), their Jacobians (k, m, 6) and noise (k, m, m) of some candidates."""
         angles, jacobian = point_directions(state, self._points[candidates], self._camera_position)
         innovation = self._seen - angles[:, : self._rows]
         innovation[:, 0] = wrap(innovation[:, 0])
-        azimuth_spread, elevation_spread, landmark_spread = self._spreads
-        height = self._camera_position[2]
-        ground = height / np.tan(np.clip(-angles[:, 1], 0.02, 1.5))
+        height, spread = self._camera_position[2], self._landmark_spread
+        ground = height / np.tan(np.minimum(np.maximum(-angles[:, 1], 0.02), 1.5))
         noise = np.zeros((len(candidates), self._rows, self._rows))
-        noise[:, 0, 0] = (
-            self.feature.azimuth_spread**2 + azimuth_spread**2 + (landmark_spread / np.maximum(ground, 0.1)) ** 2
-        )
+        noise[:, 0, 0] = self._azimuth_variance + (spread / np.maximum(ground, 0.1)) ** 2
         if self._rows == 2:
-            noise[:, 1, 1] = (
-                self.feature.elevation_spread**2
-                + elevation_spread**2
-                + (landmark_spread * height / (ground**2 + height**2)) ** 2
-            )
+            noise[:, 1, 1] = self._elevation_variance + (spread * height / (ground**2 + height**2)) ** 2
         return innovation, jacobian[:, : self._rows], noise
 
 
@@ -208,19 +274,19 @@ class LineObservation:
     def __init__(
         self,
         feature: Feature,
-        lines: tuple[LineSegment, ...],
+        lines: Lines,
         camera_position: Array,
         spreads: tuple[float, float, float],
     ):
         """Remember what was seen; arguments as of `PointObservation`."""
         self.feature = feature
-        self.count = len(lines)
         self._lines = lines
-        self._camera_position = camera_position
-        self._spreads = spreads
-        self._ends = np.array(
-            [[feature.azimuth, feature.elevation], [feature.end_azimuth, feature.end_elevation]], dtype=np.float64
-        )
+        ends = np.array([[feature.azimuth, feature.elevation], [feature.end_azimuth, feature.end_elevation]])
+        self._piece = LinePiece(ends, camera_position)
+        azimuth_spread, elevation_spread, self._line_spread = spreads
+        azimuth_variance = feature.azimuth_spread**2 + azimuth_spread**2
+        elevation_variance = feature.elevation_spread**2 + elevation_spread**2
+        self._angles_noise = np.array([azimuth_variance, elevation_variance, azimuth_variance, elevation_variance])
 
     def key(self, candidate: int) -> object:
         """Return None: several pieces of one line may be in a picture."""
@@ -228,38 +294,19 @@ class LineObservation:
 
     def possible(self, state: Array) -> Indices:
         """Return the lines along which the whole piece lies."""
-        found = []
-        for candidate, line in enumerate(self._lines):
-            along = self._misfit(state, candidate)[3]
-            if min(along) > -self.OVERHANG and max(along) < line.length + self.OVERHANG:
-                found.append(candidate)
-        return np.array(found, dtype=np.intp)
-
-    def _misfit(self, state: Array, candidate: int) -> tuple[Array, Array, Array, Array]:
-        return line_misfit(state, self._ends, self._lines[candidate], self._camera_position)
+        along = self._piece.along(state, self._lines)
+        inside = (along > -self.OVERHANG) & (along < self._lines.lengths[:, None] + self.OVERHANG)
+        return np.flatnonzero(inside[:, 0] & inside[:, 1])
 
     def ground_ends(self) -> Array:
         """Return (2, 2) both ends on the ground in base_footprint [m]."""
-        return meet_plane(rays(self._ends)[0], self._camera_position)[0]
+        return self._piece.ground_ends()
 
     def linearize(self, state: Array, candidates: Indices) -> tuple[Array, Array, Array]:
         """Return innovations (k, 2), their Jacobians (k, 2, 6) and noise (k, 2, 2) of some candidates."""
-        azimuth_spread, elevation_spread, line_spread = self._spreads
-        angles_noise = np.tile(
-            [
-                self.feature.azimuth_spread**2 + azimuth_spread**2,
-                self.feature.elevation_spread**2 + elevation_spread**2,
-            ],
-            2,
-        )
-        innovations, jacobians, noises = [], [], []
-        for candidate in candidates:
-            misfit, by_state, by_angles, along = self._misfit(state, candidate)
-            noise = (by_angles * angles_noise) @ by_angles.T
-            piece = max(abs(along[1] - along[0]), 0.1)
-            noise[0, 0] += 2.0 * (line_spread / piece) ** 2
-            noise[1, 1] += line_spread**2
-            innovations.append(-misfit)
-            jacobians.append(by_state)
-            noises.append(noise)
-        return np.array(innovations), np.array(jacobians), np.array(noises)
+        found = self._piece.misfits(state, self._lines[candidates])
+        noise = (found.by_angles * self._angles_noise) @ found.by_angles.transpose(0, 2, 1)
+        length = np.maximum(np.abs(found.along[:, 1] - found.along[:, 0]), 0.1)
+        noise[:, 0, 0] += 2.0 * (self._line_spread / length) ** 2
+        noise[:, 1, 1] += self._line_spread**2
+        return -found.misfits, found.by_state, noise

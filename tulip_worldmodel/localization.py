@@ -21,7 +21,7 @@ from tulip_vision.features import Feature, FeatureClass, Features
 from tulip_worldmodel.direction import HORIZON
 from tulip_worldmodel.landmark_association import Observation, associate
 from tulip_worldmodel.landmarks import CROSSINGS, LineObservation, PointObservation, landmarks_of
-from tulip_worldmodel.mahalanobis import gate
+from tulip_worldmodel.mahalanobis import distances_and_determinants, gate
 from tulip_worldmodel.odometry_history import Increment
 from tulip_worldmodel.rejected import Rejected
 
@@ -173,14 +173,15 @@ class Localization:
     def _motion(self, moved: Increment) -> tuple[Array, Array, Array]:
         """Return the state after a movement, its Jacobian and the noise added."""
         p = self._parameters
-        x, y, yaw, roll, pitch, drift = self._filter.x
-        step = Pose2D(yaw=yaw).rotation() @ np.array([moved.pose.x, moved.pose.y])
+        x, y, yaw, roll, pitch, drift = self._filter.x.tolist()
+        c, s = math.cos(yaw), math.sin(yaw)
+        step_x, step_y = c * moved.pose.x - s * moved.pose.y, s * moved.pose.x + c * moved.pose.y
         fade = math.exp(-moved.duration / p.tilt_time)
         keep = math.exp(-moved.duration / p.drift_time)
         turned = yaw + moved.pose.yaw + drift * moved.duration
-        state = np.array([x + step[0], y + step[1], wrap_angle(turned), roll * fade, pitch * fade, drift * keep])
+        state = np.array([x + step_x, y + step_y, wrap_angle(turned), roll * fade, pitch * fade, drift * keep])
         transition = np.diag([1.0, 1.0, 1.0, fade, fade, keep])
-        transition[0, 2], transition[1, 2] = -step[1], step[0]
+        transition[0, 2], transition[1, 2] = -step_y, step_x
         transition[2, 5] = moved.duration
         position = (
             p.position_noise_per_metre**2 * moved.distance
@@ -226,10 +227,10 @@ class Localization:
     def _correct(self, observation: Observation, candidate: int) -> bool:
         """Use an observation; False, and no change, if it misses the gate now that others were used."""
         index = np.array([candidate], dtype=np.intp)
-        innovation, jacobian, noise = (part[0] for part in observation.linearize(self._filter.x, index))
-        spread = jacobian @ self._filter.P @ jacobian.T + noise
-        distance = float(innovation @ np.linalg.solve(spread, innovation))
-        if distance > gate(self._parameters.gate_probability, len(innovation)):
+        innovations, jacobians, noises = observation.linearize(self._filter.x, index)
+        innovation, jacobian, noise = innovations[0], jacobians[0], noises[0]
+        distances, _ = distances_and_determinants(innovations, (jacobian @ self._filter.P @ jacobian.T + noise)[None])
+        if distances[0] > gate(self._parameters.gate_probability, len(innovation)):
             return False
         # The innovation is formed above (angles wrapped), so the measurement is 0 and its prediction minus that.
         self._filter.update(

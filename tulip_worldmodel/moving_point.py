@@ -5,13 +5,46 @@ State: position [m] and velocity [m/s] in odom, (4,).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
+from tulip_worldmodel.mahalanobis import distances_and_determinants
 from tulip_worldmodel.sighting import Sighting
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PointEstimate:
+    """What is known of a moving point.
+
+    Attributes:
+        state: (4,) position [m] and velocity [m/s] in odom.
+        covariance: (4, 4) of the state.
+    """
+
+    state: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class PointMotion:
+    """How a point moves on.
+
+    Attributes:
+        duration: [s].
+        keep: Share of the velocity that is left afterwards, 0 to 1; its mean acts on the position.
+        position_noise: (2, 2) covariance added to the position [m^2].
+        velocity_variance: Variance added to each component of the velocity [m^2/s^2].
+    """
+
+    duration: float
+    keep: float
+    position_noise: Array
+    velocity_variance: float
 
 
 class MovingPoint:
@@ -37,34 +70,23 @@ class MovingPoint:
         """(4, 4) of the state."""
         return np.array(self._filter.P)
 
-    def predict(self, duration: float, keep: float, position_noise: Array, velocity_variance: float) -> None:
-        """Move on.
-
-        Args:
-            duration: [s].
-            keep: Share of the velocity that is left afterwards, 0 to 1; its mean acts on the position.
-            position_noise: (2, 2) covariance added to the position [m^2].
-            velocity_variance: Variance added to each component of the velocity [m^2/s^2].
-        """
-        transition = np.eye(4)
-        transition[0, 2] = transition[1, 3] = duration * (1.0 + keep) / 2.0
-        transition[2, 2] = transition[3, 3] = keep
-        noise = np.zeros((4, 4))
-        for axis in (0, 1):  # velocity as a random walk: its integral moves the position too
-            noise[axis, axis] = velocity_variance * duration**2 / 3.0
-            noise[axis, axis + 2] = noise[axis + 2, axis] = velocity_variance * duration / 2.0
-            noise[axis + 2, axis + 2] = velocity_variance
-        noise[:2, :2] += position_noise
-        self._filter.F = transition
-        self._filter.Q = noise
+    def predict(self, motion: PointMotion) -> None:
+        """Move on."""
+        self._filter.F, self._filter.Q = _transition_and_noise(motion)
         self._filter.predict()
         self._tidy()
+
+    def predicted(self, motion: PointMotion) -> PointEstimate:
+        """Return what `predict` leads to, without changing the filter."""
+        transition, noise = _transition_and_noise(motion)
+        covariance = transition @ self._filter.P @ transition.T + noise
+        return PointEstimate(transition @ self._filter.x, (covariance + covariance.T) / 2.0)
 
     def distance(self, sighting: Sighting) -> float:
         """Return the squared Mahalanobis distance of a sighting."""
         innovation, jacobian = sighting.innovation(self._filter.x[:2])
         spread = jacobian @ self._filter.P[:2, :2] @ jacobian.T + sighting.noise
-        return float(innovation @ np.linalg.solve(spread, innovation))
+        return float(distances_and_determinants(innovation[None], spread[None])[0][0])
 
     def correct(self, innovation: Array, jacobian: Array, noise: Array) -> None:
         """Apply a measurement of the position: (m,) innovation, (m, 2) Jacobian, (m, m) noise."""
@@ -80,3 +102,32 @@ class MovingPoint:
 
     def _tidy(self) -> None:
         self._filter.P = (self._filter.P + self._filter.P.T) / 2.0
+
+
+def _transition_and_noise(motion: PointMotion) -> tuple[Array, Array]:
+    """Return the (4, 4) transition of the state and the (4, 4) covariance added."""
+    duration, keep, variance = motion.duration, motion.keep, motion.velocity_variance
+    drift = duration * (1.0 + keep) / 2.0
+    transition = np.array(
+        [[1.0, 0.0, drift, 0.0], [0.0, 1.0, 0.0, drift], [0.0, 0.0, keep, 0.0], [0.0, 0.0, 0.0, keep]]
+    )
+    # Velocity as a random walk: its integral moves the position too.
+    position, both = variance * duration**2 / 3.0, variance * duration / 2.0
+    noise = np.array(
+        [[position, 0.0, both, 0.0], [0.0, position, 0.0, both], [both, 0.0, variance, 0.0], [0.0, both, 0.0, variance]]
+    )
+    noise[:2, :2] += motion.position_noise
+    return transition, noise
+
+
+def position_noise(offset: tuple[float, float], everywhere: float, across: float) -> Array:
+    """Return the (2, 2) covariance [m^2] by which dead reckoning of the observer makes a place less sure.
+
+    Args:
+        offset: From the observer to the point [m].
+        everywhere: Variance in all directions [m^2].
+        across: Variance of the observer's heading [rad^2], which acts across the offset.
+    """
+    x, y = offset
+    both = -across * x * y
+    return np.array([[everywhere + across * y**2, both], [both, everywhere + across * x**2]])

@@ -12,7 +12,7 @@ from tulip_description.planar import wrap_angle
 from tulip_vision.features import FeatureClass, Features
 from tulip_worldmodel.association import assign
 from tulip_worldmodel.mahalanobis import gate
-from tulip_worldmodel.moving_point import MovingPoint
+from tulip_worldmodel.moving_point import MovingPoint, PointEstimate, PointMotion, position_noise
 from tulip_worldmodel.odometry_history import Increment
 from tulip_worldmodel.rejected import Rejected
 from tulip_worldmodel.sighting import Observer, Sighting, in_view
@@ -80,6 +80,25 @@ class Opponent:
         self.confirmed = self.confirmed or self.confidence >= self._parameters.confirmed
         self.last_seen = sighting.observer.stamp
 
+    def walking(self, moved: Increment, observer_position: Array) -> PointMotion:
+        """Return how it walks on while the robot moves; its velocity fades with `velocity_time`."""
+        p = self._parameters
+        x, y = self.point.state[:2].tolist()
+        return PointMotion(
+            moved.duration,
+            math.exp(-moved.duration / p.velocity_time),
+            position_noise(
+                (x - float(observer_position[0]), y - float(observer_position[1])),
+                p.position_noise_per_second**2 * moved.duration + p.position_noise_per_metre**2 * moved.distance,
+                p.position_noise_per_radian**2 * moved.turned,
+            ),
+            p.velocity_noise**2 * moved.duration,
+        )
+
+    def extrapolated(self, moved: Increment, observer_position: Array) -> PointEstimate:
+        """Return where it is after a movement as in `OpponentFilter.predict`, without changing the filter."""
+        return self.point.predicted(self.walking(moved, observer_position))
+
 
 class OpponentFilter:
     """All opponents."""
@@ -97,7 +116,7 @@ class OpponentFilter:
     def predict(self, moved: Increment, observer_position: Array) -> None:
         """Let opponents walk on while the robot moves; arguments as of `BallFilter.predict`."""
         for opponent in self._opponents:
-            walk_on(opponent.point, self._parameters, moved, observer_position)
+            opponent.point.predict(opponent.walking(moved, observer_position))
 
     def update(self, features: Features, observer: Observer, since_last: float) -> tuple[Rejected, ...]:
         """Use one picture, with the opponents predicted to its stamp.
@@ -179,15 +198,3 @@ class OpponentFilter:
             if all(math.dist(place, other.point.state[:2]) > self._parameters.body_radius for other in kept):
                 kept.append(opponent)
         self._opponents = [opponent for opponent in self._opponents if opponent in kept]
-
-
-def walk_on(point: MovingPoint, parameters: OpponentParameters, moved: Increment, observer_position: Array) -> None:
-    """Predict an opponent, whose velocity fades with `velocity_time`."""
-    p = parameters
-    offset = point.state[:2] - observer_position
-    across = np.array([-offset[1], offset[0]])
-    noise = np.eye(2) * (
-        p.position_noise_per_second**2 * moved.duration + p.position_noise_per_metre**2 * moved.distance
-    ) + np.outer(across, across) * (p.position_noise_per_radian**2 * moved.turned)
-    keep = math.exp(-moved.duration / p.velocity_time)
-    point.predict(moved.duration, keep, noise, p.velocity_noise**2 * moved.duration)

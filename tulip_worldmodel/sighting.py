@@ -31,8 +31,9 @@ class Observer:
 
     def offset(self, position: Array, height: float) -> Array:
         """Return (1, 3) from the optical centre to a point (2,) of odom at a height, in base_footprint axes [m]."""
-        relative = self.pose.rotation().T @ (position - [self.pose.x, self.pose.y])
-        return np.array([[*(relative - self.camera_position[:2]), height - self.camera_position[2]]])
+        camera_x, camera_y, camera_z = self.camera_position.tolist()
+        x, y = self.pose.inverse().transform(position)
+        return np.array([[x - camera_x, y - camera_y, height - camera_z]])
 
     def direction(self, position: Array, height: float) -> tuple[Array, Array]:
         """Return the (2,) angles of a point (2,) of odom at a height, and their (2, 2) derivatives by the point."""

@@ -6,7 +6,6 @@ stamp of the last picture; the path since then is kept, and `state` predicts alo
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,9 +17,9 @@ from tulip_motion.interface import Odometry
 from tulip_vision.features import Features
 from tulip_worldmodel.ball_filter import BallFilter, BallParameters
 from tulip_worldmodel.localization import Localization, LocalizationParameters
-from tulip_worldmodel.moving_point import MovingPoint
+from tulip_worldmodel.moving_point import PointEstimate
 from tulip_worldmodel.odometry_history import OdometryHistory, PathPoint, increment
-from tulip_worldmodel.opponent_filter import OpponentFilter, OpponentParameters, walk_on
+from tulip_worldmodel.opponent_filter import OpponentFilter, OpponentParameters
 from tulip_worldmodel.rejected import Rejected
 from tulip_worldmodel.sighting import Observer
 from tulip_worldmodel.world_state import ObjectEstimate, RobotEstimate, WorldState
@@ -125,12 +124,11 @@ class WorldModel:
         if self._ball.known:
             point = self._ball.extrapolated(moved, here)
             ball = _estimate(point, robot, then.stamp, self._ball.last_seen, self._ball.confidence)
-        opponents = []
-        for opponent in self._opponents.confirmed:
-            point = copy.deepcopy(opponent.point)
-            walk_on(point, self._parameters.opponents, moved, here)
-            opponents.append(_estimate(point, robot, then.stamp, opponent.last_seen, opponent.confidence))
-        return WorldState(then.stamp, robot, ball, tuple(opponents))
+        opponents = tuple(
+            _estimate(opponent.extrapolated(moved, here), robot, then.stamp, opponent.last_seen, opponent.confidence)
+            for opponent in self._opponents.confirmed
+        )
+        return WorldState(then.stamp, robot, ball, opponents)
 
     def _advance(self, stamp: int) -> None:
         """Predict all filters along the path to a stamp."""
@@ -154,11 +152,12 @@ class WorldModel:
 
 
 def _estimate(
-    point: MovingPoint, robot: RobotEstimate, stamp: int, last_seen: int, confidence: float
+    point: PointEstimate, robot: RobotEstimate, stamp: int, last_seen: int, confidence: float
 ) -> ObjectEstimate:
     """Turn a point of odom into what others want to know of it."""
     to_footprint = robot.pose_in_odom.rotation().T
-    both = np.kron(np.eye(2), to_footprint)
+    both = np.zeros((4, 4))
+    both[:2, :2] = both[2:, 2:] = to_footprint
     state = point.state
     relative = np.array(robot.pose_in_odom.inverse().transform(state[:2]))
     velocity = to_footprint @ state[2:]

@@ -44,7 +44,7 @@ class WorldModelNode(ComponentNode):
     def __init__(self) -> None:
         """Make the core and connect it."""
         super().__init__("worldmodel")
-        self._parameters = self.load(WorldModelNodeParameters())
+        self._settings = self.load(WorldModelNodeParameters())
         self._last_odometry: int | None = None  # stamp [ns]
         self._last_published: int | None = None  # stamp [ns]
         self._world = self._new_world()
@@ -55,7 +55,7 @@ class WorldModelNode(ComponentNode):
         self.listen(topics.FEATURES, self._on_features)
 
     def _new_world(self) -> WorldModel:
-        p = self._parameters
+        p = self._settings
         try:
             field = load_field(p.field_file or None)
         except FieldError as error:
@@ -71,7 +71,7 @@ class WorldModelNode(ComponentNode):
         self._last_odometry = stamp
         self._world.add_odometry(odometry_from_message(message))
         published = self._last_published
-        if published is None or stamp - published >= self._parameters.publish_period * 1e9:
+        if published is None or stamp - published >= self._settings.publish_period * 1e9:
             self._last_published = stamp
             self._publish(self._world.state(stamp))
 

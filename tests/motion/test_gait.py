@@ -22,7 +22,9 @@ velocities = st.tuples(st.floats(-0.3, 0.6), st.floats(-0.2, 0.2), st.floats(-1.
 
 
 @given(st.sampled_from(Side), velocities)
-def test_feet_never_come_nearer_than_the_stance_width_sideways(side: Side, velocity: tuple[float, float, float]) -> None:
+def test_feet_never_come_nearer_than_the_stance_width_sideways(
+    side: Side, velocity: tuple[float, float, float]
+) -> None:
     stance = Footstep(side, Pose2D(0.3, -0.2, 0.7))
     landed = next_footstep(stance, velocity, P.step_time, P.stance_width)
     beside = stance.pose.inverse() @ landed.pose

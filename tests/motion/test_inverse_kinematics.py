@@ -22,6 +22,7 @@ from tulip_motion.inverse_kinematics import (
     orientation_error,
     rotation_z,
     skew,
+    solve_3,
 )
 from tulip_motion.motion import with_fixed_head
 
@@ -76,6 +77,12 @@ def test_jacobian_agrees_with_finite_differences(stance: Side) -> None:
     np.testing.assert_allclose(jacobian, numeric, atol=1e-8)  # central differences: h^2 and 1e-16 / h
 
 
+@given(st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3), small_turns)
+def test_cramers_rule_solves_as_numpy_does(right: list[float], turn: tuple[float, float, float]) -> None:
+    matrix = pin.exp3(np.array(turn)) + 0.3 * np.eye(3)
+    np.testing.assert_allclose(solve_3(matrix, np.array(right)), np.linalg.solve(matrix, right), atol=1e-12)
+
+
 @given(small_turns, small_turns)
 def test_orientation_error_and_its_matrix_agree_with_eqs_9_and_11_as_printed(
     a: tuple[float, float, float], b: tuple[float, float, float]
@@ -95,7 +102,9 @@ def resting_target(com: np.ndarray, foot: Pose2D) -> TaskTarget:
 
 
 @settings(max_examples=15, deadline=None)
-@given(st.floats(-0.05, 0.05), st.floats(-0.08, 0.08), st.floats(-0.04, 0.02), st.floats(-0.1, 0.1), st.floats(-0.3, 0.3))
+@given(
+    st.floats(-0.05, 0.05), st.floats(-0.08, 0.08), st.floats(-0.04, 0.02), st.floats(-0.1, 0.1), st.floats(-0.3, 0.3)
+)
 def test_closed_loop_converges_on_reachable_targets_and_does_not_drift(
     x: float, y: float, z: float, step: float, yaw: float
 ) -> None:

@@ -55,7 +55,8 @@ def test_stands_still_with_the_zmp_between_the_feet() -> None:
 
 
 @pytest.mark.parametrize(
-    ("velocity", "moved"), [((0.4, 0.0, 0.0), (3.1, 0.0)), ((-0.2, 0.0, 0.0), (-1.4, 0.0)), ((0.0, 0.15, 0.0), (0.0, 1.0))]
+    ("velocity", "moved"),
+    [((0.4, 0.0, 0.0), (3.1, 0.0)), ((-0.2, 0.0, 0.0), (-1.4, 0.0)), ((0.0, 0.15, 0.0), (0.0, 1.0))],
 )
 def test_walks_as_commanded_then_stops(velocity: tuple[float, float, float], moved: tuple[float, float]) -> None:
     run = Run()

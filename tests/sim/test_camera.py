@@ -10,12 +10,10 @@ import pytest
 
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.field import load_field
-from tulip_description.keeper import keeper_parts
 from tulip_description.planar import Pose2D
 from tulip_description.posture import standing_posture
 from tulip_description.robot import load_robot
 from tulip_sim.camera import CameraParameters, CameraRenderer
-from tulip_sim.keeper import KEEPER_BOXES
 from tulip_sim.scene import COLOURS, Boxes, Scene, keeper_boxes
 from tulip_sim.truth import Truth
 from tulip_vision.lens import Lens, head_camera_lens
@@ -234,11 +232,6 @@ def test_boxes_near_far_and_partly_behind_cover_the_pixels_whose_rays_meet_them(
     rim[1:] |= expected[1:] != expected[:-1]
     rim[:, 1:] |= expected[:, 1:] != expected[:, :-1]
     assert wrong <= 0.7 * rim.sum() + 5  # less than one pixel along the outline
-
-
-def test_keeper_in_the_picture_is_the_keeper_that_stops_the_ball():
-    solid = {(part.centre, part.size) for part in keeper_parts() if part.solid}
-    assert solid == {(box.centre, box.size) for box in KEEPER_BOXES if box.collides}
 
 
 def test_markers_on_chest_and_back_hide_behind_the_trunk_at_any_distance(pinhole):

@@ -1,4 +1,4 @@
-"""Vision against rendered scenes with known truth. The bars are below what 300 scenes gave (see the docstrings)."""
+"""Vision against rendered scenes with known truth. The bars are a little below what 300 scenes gave."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def usual() -> dict[str, Tally]:
 
 
 def test_balls_to_6_m_are_found_within_a_fraction_of_a_pixel_and_none_is_invented(usual: dict[str, Tally]) -> None:
-    """300 scenes: 1.00 found, 0.00 deg median, none false."""
+    """300 scenes: 192 of 193 found, 0.01 deg median, none false."""
     ball = usual["ball"]
     assert ball.there >= 30
     assert ball.recall >= 0.95

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tulip_description.field import LineSegment, load_field
 from tulip_vision.features import FeatureClass
 from tulip_worldmodel.direction import directions, meet_plane, rays
-from tulip_worldmodel.landmarks import half_turn, landmarks_of, line_misfit, point_directions
+from tulip_worldmodel.landmarks import LinePiece, half_turn, landmarks_of, lines_of, point_directions
 
 CAMERA = np.array([0.05, 0.02, 1.15])
 STEP = 1e-6
@@ -56,14 +56,15 @@ def test_jacobian_of_point_directions_agrees_with_finite_differences(state, plac
 def test_jacobians_of_line_misfit_agree_with_finite_differences(state, ends) -> None:
     azimuth, elevation, width, end_elevation = ends
     seen = np.array([[azimuth, elevation], [azimuth + width, end_elevation]])
-    line = LineSegment((1.0, -2.0), (-2.0, 1.0))
-    misfit, by_state, by_angles, _ = line_misfit(state, seen, line, CAMERA)
-    if abs(misfit[0]) > 1.56:
-        return  # the direction's wrap is not differentiable
-    expected = numeric(lambda x: line_misfit(x, seen, line, CAMERA)[0], state)
-    assert np.allclose(by_state, expected, rtol=1e-4, atol=1e-5)
-    expected = numeric(lambda z: line_misfit(state, z.reshape(2, 2), line, CAMERA)[0], seen.ravel())
-    assert np.allclose(by_angles, expected, rtol=1e-4, atol=1e-4)
+    lines = lines_of([LineSegment((1.0, -2.0), (-2.0, 1.0)), LineSegment((3.0, -2.0), (3.0, 2.0))])
+    found = LinePiece(seen, CAMERA).misfits(state, lines)
+    by_state = numeric(lambda x: LinePiece(seen, CAMERA).misfits(x, lines).misfits, state)
+    by_angles = numeric(lambda z: LinePiece(z.reshape(2, 2), CAMERA).misfits(state, lines).misfits, seen.ravel())
+    for line in range(2):
+        if abs(found.misfits[line, 0]) > 1.56:
+            continue  # the direction's wrap is not differentiable
+        assert np.allclose(found.by_state[line], by_state[line], rtol=1e-4, atol=1e-5)
+        assert np.allclose(found.by_angles[line], by_angles[line], rtol=1e-4, atol=1e-4)
 
 
 @given(azimuth=st.floats(-3.1, 3.1), elevation=st.floats(-1.4, -0.1), height=st.floats(0.0, 0.2))
@@ -83,18 +84,20 @@ def test_jacobian_of_rays_on_a_plane_agrees_with_finite_differences() -> None:
 
 
 def test_piece_on_the_line_has_no_misfit_in_either_order_of_its_ends() -> None:
-    line = LineSegment((2.0, -2.0), (2.0, 2.0))
+    lines = lines_of([LineSegment((2.0, -2.0), (2.0, 2.0))])
     state = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0])
     seen, _ = point_directions(state, np.array([[2.0, -1.0], [2.0, 1.5]]), CAMERA)
     for ends in (seen, seen[::-1]):
-        misfit, _, _, along = line_misfit(state, ends, line, CAMERA)
-        assert misfit == pytest.approx([0.0, 0.0], abs=1e-9)
-        assert sorted(along) == pytest.approx([1.0, 3.5])
+        piece = LinePiece(ends, CAMERA)
+        found = piece.misfits(state, lines)
+        assert found.misfits[0] == pytest.approx([0.0, 0.0], abs=1e-9)
+        assert sorted(found.along[0]) == pytest.approx([1.0, 3.5])
+        assert piece.along(state, lines) == pytest.approx(found.along)
 
 
 @given(st.floats(-20.0, 20.0))
 def test_half_turn_keeps_an_undirected_line(angle: float) -> None:
-    wrapped = half_turn(angle)
+    wrapped = half_turn(np.array([angle]))[0]
     assert -math.pi / 2.0 <= wrapped <= math.pi / 2.0
     assert math.sin(wrapped - angle) == pytest.approx(0.0, abs=1e-9)
 

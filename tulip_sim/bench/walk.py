@@ -39,7 +39,7 @@ def summarize(rows: list[Row]) -> list[str]:
         f"Straight ahead for {DURATION:.0f} s without camera; friction 0.6-1.0, link masses +-5 %, joint friction, sensor"
         " noise and delay are random, and one tick of delay between sensors and torques.",
         "",
-        "| commanded | upright | distance, median | sideways drift, greatest | tilt, greatest | torque / limit, greatest |",
+        "| commanded | upright | distance, median | sideways, most | tilt, most | torque by its limit, most |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for speed in sorted({row["speed commanded [m/s]"] for row in rows}):
