@@ -59,9 +59,7 @@ def orientation_error(desired: Array, actual: Array) -> Array:
     The sum of the cross products of matching columns is the vee of R_d R_e^T minus its transpose.
     """
     product = desired @ actual.T
-    return 0.5 * np.array(
-        [product[2, 1] - product[1, 2], product[0, 2] - product[2, 0], product[1, 0] - product[0, 1]]
-    )
+    return 0.5 * np.array([product[2, 1] - product[1, 2], product[0, 2] - product[2, 0], product[1, 0] - product[0, 1]])
 
 
 def error_rate_matrix(desired: Array, actual: Array) -> Array:

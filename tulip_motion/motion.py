@@ -293,7 +293,9 @@ class Motion:
             kinematics.joint_velocities - estimate.joint_velocities,
         )
         self._torques[1] = torques
-        return self._send(kinematics.joint_positions.copy(), kinematics.joint_velocities.copy(), torques, stiffness, damping)
+        return self._send(
+            kinematics.joint_positions.copy(), kinematics.joint_velocities.copy(), torques, stiffness, damping
+        )
 
     def _aims(self, reference: Reference) -> tuple[Array, Array]:
         """Return the aim points of the ZMP on the left and right foot, in odom [m]."""

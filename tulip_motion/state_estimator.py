@@ -179,9 +179,7 @@ def _wxyz(xyzw: Array) -> tuple[float, float, float, float]:
 
 def planar_pose(transform: Array) -> Pose2D:
     """Return where a (4, 4) transform lies on the ground, with its yaw."""
-    return Pose2D(
-        float(transform[0, 3]), float(transform[1, 3]), float(np.arctan2(transform[1, 0], transform[0, 0]))
-    )
+    return Pose2D(float(transform[0, 3]), float(transform[1, 3]), float(np.arctan2(transform[1, 0], transform[0, 0])))
 
 
 def keep_distance(anchor: Pose2D, measured: Pose2D, other: Pose2D) -> Pose2D:

@@ -67,7 +67,11 @@ class Walking:
             self._time += dt
             if self._swing is not None and self._has_landed(loads):
                 side = self._stance.side.other
-                self.feet = (self.feet[0], Footstep(side, landed[side])) if side is Side.RIGHT else (Footstep(side, landed[side]), self.feet[1])
+                self.feet = (
+                    (self.feet[0], Footstep(side, landed[side]))
+                    if side is Side.RIGHT
+                    else (Footstep(side, landed[side]), self.feet[1])
+                )
                 self._begin_step(self.feet[side], wanted, self._parameters.double_support_time)
         return self._reference(dt, dcm)
 

@@ -148,5 +148,3 @@ def play_graph(
             real_time_factor=watcher.real_time_factor,
             recording=str(record / f"{record.name}.mcap") if record is not None else "",
         )
-
-

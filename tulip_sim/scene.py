@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -152,12 +152,13 @@ def _steps(low: float, high: float) -> Sequence[float]:
 class Body:
     """The robot's own body: where its links and its camera are for given joint angles."""
 
-    def __init__(self, robot: Robot, team_colour: str) -> None:
+    def __init__(self, robot: Robot, team_colour: str, unseen: Collection[str] = UNSEEN) -> None:
         """Collect the boxes.
 
         Args:
             robot: A robot with a camera.
             team_colour: Of its marker.
+            unseen: Links whose boxes are left out.
 
         Raises:
             ValueError: if the robot has no camera.
@@ -168,7 +169,7 @@ class Body:
         self._camera = robot.camera
         self._soles = robot.soles
         self._columns = {joint.name: column for column, joint in enumerate(robot.moving)}
-        seen = [(link.name, box) for link in robot.links for box in link.boxes if link.name not in UNSEEN]
+        seen = [(link.name, box) for link in robot.links for box in link.boxes if link.name not in unseen]
         self._links = [name for name, _ in seen]
         self._centres = np.array([box.centre for _, box in seen])
         self._sizes = np.array([box.size for _, box in seen])
@@ -198,7 +199,7 @@ class Body:
         return camera
 
     def boxes(self, links: dict[str, Array]) -> Boxes:
-        """Return the boxes of all links that the camera can see."""
+        """Return the boxes of all links but the unseen ones."""
         transforms = np.stack([links[name] for name in self._links])
         transforms[:, :3, 3] += np.einsum("bij,bj->bi", transforms[:, :3, :3], self._centres)
         return Boxes(transforms, self._sizes, self._colours)

@@ -54,6 +54,4 @@ def summarize(rows: list[Row]) -> list[str]:
     return lines
 
 
-BENCH = Bench(
-    "walk", "Walking", [(speed, seed) for speed in SPEEDS for seed in range(SEEDS)], measure, summarize
-)
+BENCH = Bench("walk", "Walking", [(speed, seed) for speed in SPEEDS for seed in range(SEEDS)], measure, summarize)
