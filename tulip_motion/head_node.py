@@ -24,12 +24,16 @@ class HeadNode(ComponentNode):
         """Make the core and connect it."""
         super().__init__("head")
         self._settings = self.load(HeadParameters())
-        self._head = HeadMovement(self._settings, load_robot())
-        self._command = HeadCommand(0, HeadMode.HOLD)
-        self._last = -PERIOD  # stamp of the joint state answered last [ns]
+        self.begin_anew()
         self._publisher = self.sender(topics.HEAD_JOINT_COMMAND)
         self.listen(topics.HEAD_COMMAND, self._on_command)
         self.listen(topics.JOINT_STATES, self._on_joints)
+
+    def begin_anew(self) -> None:
+        """Make the core, which holds still until the first command."""
+        self._head = HeadMovement(self._settings, load_robot())
+        self._command = HeadCommand(0, HeadMode.HOLD)
+        self._last = -PERIOD  # stamp of the joint state answered last [ns]
 
     def _on_command(self, message: HeadCommandMessage) -> None:
         self._command = head_command_from_message(message)

@@ -13,7 +13,7 @@ from tulip_description.model import floating_model
 from tulip_description.planar import Pose2D
 from tulip_description.robot import HEAD_JOINTS, LEG_JOINTS, Robot
 from tulip_description.robot_io import JointCommand, Sensors
-from tulip_motion.feedforward import feedforward
+from tulip_motion.feedforward import distance_share, feedforward
 from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import FootMotion, Reference, sole_point
 from tulip_motion.interface import (
@@ -280,8 +280,7 @@ class Motion:
             generalized,
             kinematics.sole_positions,
             kinematics.sole_jacobians,
-            self._aims(reference),
-            balance.right_share,
+            *self._sharing(reference, balance),
         )
         stance = reference.stance.pose
         kinematics.integrate(p.control_period, np.array([stance.x, stance.y, 0.0]), stance.yaw)
@@ -297,15 +296,18 @@ class Motion:
             kinematics.joint_positions.copy(), kinematics.joint_velocities.copy(), torques, stiffness, damping
         )
 
-    def _aims(self, reference: Reference) -> tuple[Array, Array]:
-        """Return the aim points of the ZMP on the left and right foot, in odom [m]."""
+    def _sharing(self, reference: Reference, balance: Balance) -> tuple[float, tuple[Array, Array] | None]:
+        """Return alpha, and the aim points of the ZMP on the left and right foot in odom [m] or None, eq. (15)."""
         p = self._parameters
+        if p.weight_sharing == "distance":
+            return distance_share(self._estimate.com, *self._kinematics.sole_positions), None
         foot = reference.other
         other = Footstep(
             reference.stance.side.other, Pose2D(float(foot.position[0]), float(foot.position[1]), foot.yaw)
         )
         points = [np.array([*sole_point(step, p.zmp_forward, p.zmp_inward), 0.0]) for step in (reference.stance, other)]
-        return (points[0], points[1]) if reference.stance.side is Side.LEFT else (points[1], points[0])
+        left, right = points if reference.stance.side is Side.LEFT else points[::-1]
+        return balance.right_share, (left, right)
 
     def _limp(self, estimate: Estimate) -> JointCommand:
         stiffness, damping = self._gains.limp

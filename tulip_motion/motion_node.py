@@ -44,15 +44,13 @@ class MotionNode(ComponentNode):
     def __init__(self) -> None:
         """Make the core and connect it."""
         super().__init__("motion")
-        self._motion = Motion(self.load(MotionParameters()), load_robot())
-        self._tick = 0
-        self._walking_until = 0
+        self._settings = self.load(MotionParameters())
         self._kick: _RunningKick | None = None
+        self.begin_anew()
         self._legs = self.sender(topics.LEG_COMMAND)
         self._odometry = self.sender(topics.ODOMETRY)
         self._state = self.sender(topics.MOTION_STATE)
         self._tf = self.sender(topics.TF)
-        self._sensors = SameStamp("joint_states", "imu", "foot_forces")
         self.listen(topics.JOINT_STATES, lambda message: self._on_sensor("joint_states", message))
         self.listen(topics.IMU, lambda message: self._on_sensor("imu", message))
         self.listen(topics.FOOT_FORCES, lambda message: self._on_sensor("foot_forces", message))
@@ -64,6 +62,16 @@ class MotionNode(ComponentNode):
             self._execute_kick,
             cancel_callback=lambda _: CancelResponse.REJECT,
         )
+
+    def begin_anew(self) -> None:
+        """Make the core; a kick that was under way has failed."""
+        self._motion = Motion(self._settings, load_robot())
+        self._sensors = SameStamp("joint_states", "imu", "foot_forces")
+        self._tick = 0
+        self._walking_until = 0
+        if self._kick is not None:
+            self._kick.done.set_result((False, "time began anew during the kick"))
+            self._kick = None
 
     def _on_sensor(self, name: str, message: Any) -> None:
         complete = self._sensors.add(name, stamp_of(message), message)

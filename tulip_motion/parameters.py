@@ -69,6 +69,10 @@ class MotionParameters:
     clik_gain_orientation: float = 20.0  # [1/s] K_o
     clik_damping: float = 1e-6  # keeps the solve finite at the straight knee
 
+    # Feedforward, eq. (15): "zmp" shares the weight by the commanded ZMP about the common centre of pressure;
+    # "distance" is the printed form, alpha from the CoM's distances to the feet, with which the robot does not walk
+    weight_sharing: str = "zmp"
+
     # Joint control, eq. (13)
     stance_stiffness: tuple[float, ...] = (150.0, 400.0, 400.0, 400.0, 200.0, 200.0)  # [N m/rad]
     stance_damping: tuple[float, ...] = (3.0, 8.0, 8.0, 8.0, 2.0, 0.4)  # [N m s/rad]
@@ -88,6 +92,8 @@ class MotionParameters:
             raise ValueError(
                 f"double_support_time is {self.double_support_time} s; expected less than step_time, {self.step_time} s"
             )
+        if self.weight_sharing not in ("zmp", "distance"):
+            raise ValueError(f"weight_sharing is {self.weight_sharing!r}; expected zmp or distance")
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, tuple) and (len(value) != 6 or min(value) < 0.0):

@@ -7,7 +7,6 @@ answers, features arrive some ticks after their picture.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -23,7 +22,8 @@ from tulip_motion.head import HeadMovement, HeadParameters
 from tulip_motion.interface import HeadCommand, HeadMode, MotionState
 from tulip_motion.motion import Motion
 from tulip_motion.parameters import MotionParameters
-from tulip_sim.camera import CameraParameters, CameraRenderer
+from tulip_sim.camera import CameraParameters
+from tulip_sim.eyes import Eyes, EyesBeside, EyesParameters, OwnEyes
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.referee import Outcome, Referee, RefereeParameters
 from tulip_sim.scenario import Scenario
@@ -34,13 +34,10 @@ from tulip_strategy.game_input import GameInput, GameInputParameters
 from tulip_strategy.interface import Decision, GameState, UserCommand, UserRequest
 from tulip_strategy.parameters import StrategyParameters
 from tulip_strategy.strategy import Strategy
-from tulip_vision.features import Features
-from tulip_vision.lens import Lens, head_camera_lens
-from tulip_vision.pipeline import Vision, VisionParameters
+from tulip_vision.pipeline import VisionParameters
 from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParameters
 from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
 
-Picture = NDArray[np.uint8]
 Vector = Sequence[float] | NDArray[np.float64]
 Listener = Callable[[str, int, object], None]
 """Is told everything that passes between components: topic name, stamp [ns], object."""
@@ -70,6 +67,7 @@ class Lockstep:
         seed: int,
         settings: Settings | None = None,
         listener: Listener | None = None,
+        eyes_beside: bool = False,
     ) -> None:
         """Wire the cores.
 
@@ -79,17 +77,17 @@ class Lockstep:
             seed: Of everything random.
             settings: Parameters of all cores.
             listener: Told of every message that the graph would carry.
+            eyes_beside: Let camera and vision work in a process of their own: faster where a core is free.
+                Call `close` at the end then. The trial is the same.
         """
         settings = settings or Settings()
         robot_field: Field = load_field()
         robot: Robot = load_robot()
-        lens: Lens = head_camera_lens()
         self._tell = listener or (lambda topic, stamp, value: None)
         self.world = World(scenario, settings.world, seed, robot_field, robot)
         self.referee = Referee(settings.referee, robot_field)
-        self._camera = CameraRenderer(settings.camera, robot_field, robot, lens)
-        self._camera_rng = np.random.default_rng([seed, 1])
-        self.vision = Vision(settings.vision, lens)
+        eyes = EyesParameters(settings.camera, settings.vision, seed)
+        self._eyes: Eyes = EyesBeside(eyes) if eyes_beside else OwnEyes(eyes)
         self._poses = PoseBuffer(
             PoseBufferParameters(), lambda height, turn, pan, tilt: camera_in_footprint(robot, height, turn, pan, tilt)
         )
@@ -101,7 +99,8 @@ class Lockstep:
         self.user = UserCommand(0, UserRequest.PLAY)
         self._head_command = HeadCommand(0, HeadMode.HOLD)
         self._pending: list[JointCommand] = []
-        self._pictures: deque[tuple[int, Picture]] = deque()
+        self._exposed: int | None = None  # stamp of the picture worked on [ns]
+        self._looking = False
         self._tick = 0
         self.doing = ""
         """Active path of the behaviour tree."""
@@ -127,13 +126,7 @@ class Lockstep:
         tell("legs/joint_command", sensors.stamp, self._pending[0])
         if tick % SLOW_TICKS == 0:
             self._slow(sensors.stamp, sensors.joint_positions[12:])
-        if tick % CAMERA_TICKS == 0:
-            truth = self.world.truth()
-            picture = self._camera.render(truth, self._camera_rng)
-            self._pictures.append((truth.stamp, picture))
-            tell("camera/image_raw", truth.stamp, picture)
-        if self._pictures and self.stamp - self._pictures[0][0] >= FEATURE_DELAY_TICKS * TICK * 1_000_000:
-            self._see(*self._pictures.popleft())
+        self._see(tick % CAMERA_TICKS)
         if tick % DECISION_TICKS == 0:
             self._decide(sensors.stamp)
         self.world.advance(TICK)
@@ -158,6 +151,11 @@ class Lockstep:
                 progress(self)
         return self.referee.outcome
 
+    def close(self) -> None:
+        """Free the physics engine and end the process of the eyes, if there is one."""
+        self._eyes.close()
+        self.world.close()
+
     def _slow(self, stamp: int, head_positions: NDArray[np.float64]) -> None:
         odometry = self.motion.odometry()
         self.world_model.add_odometry(odometry)
@@ -170,13 +168,22 @@ class Lockstep:
         self._tell("head/joint_command", stamp, command)
         self._tell("ground_truth", stamp, (self.world.truth(), self.referee))
 
-    def _see(self, stamp: int, picture: Picture) -> None:
-        pose = self._poses.camera_in_footprint(stamp)
-        if isinstance(pose, MissingPose):
-            return
-        features: Features = self.vision.process(picture, stamp, pose)
-        self.world_model.add_features(features)
-        self._tell("features", stamp, features)
+    def _see(self, tick: int) -> None:
+        """Take a picture, look at it as soon as its camera pose is known, and use what was seen when it is due."""
+        if tick == 0:
+            self._exposed, self._looking = self.stamp, False
+            self._eyes.expose(self.world.truth())
+        if self._exposed is not None and not self._looking:
+            pose = self._poses.camera_in_footprint(self._exposed)
+            if not isinstance(pose, MissingPose):
+                self._eyes.look(self._exposed, pose)
+                self._looking = True
+        if self._exposed is not None and self._looking and tick == FEATURE_DELAY_TICKS:
+            picture, features = self._eyes.collect()
+            self.world_model.add_features(features)
+            self._tell("camera/image_raw", self._exposed, picture)
+            self._tell("features", self._exposed, features)
+            self._exposed = None
 
     def _decide(self, stamp: int) -> None:
         world = self.world_model.state(stamp)

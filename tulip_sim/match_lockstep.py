@@ -24,6 +24,7 @@ def play_lockstep(
     settings: Settings | None = None,
     record: Path | None = None,
     progress: Progress | None = None,
+    eyes_beside: bool = False,
 ) -> TrialSummary:
     """Play one trial.
 
@@ -33,6 +34,7 @@ def play_lockstep(
         settings: Parameters of all cores.
         record: New folder for the recording, or None for none.
         progress: Told once in a simulated second.
+        eyes_beside: Let camera and vision work in a process of their own.
 
     Raises:
         BadInputError: if the recording cannot be written.
@@ -44,9 +46,11 @@ def play_lockstep(
         if recording is not None:
             recording.write(topic, stamp, value)
 
-    begin = time.monotonic()
+    trial: Lockstep | None = None
     try:
-        trial = Lockstep(make_scenario(scenario, np.random.default_rng(seed), load_field()), seed, settings, listen)
+        start = make_scenario(scenario, np.random.default_rng(seed), load_field())
+        trial = Lockstep(start, seed, settings, listen, eyes_beside)
+        begin = time.monotonic()
 
         def watch(now: Lockstep) -> None:
             observer.see_truth(robot_pose(now.world.truth()))
@@ -55,10 +59,13 @@ def play_lockstep(
                 progress(now.stamp * 1e-9, now.doing)
 
         outcome = trial.play(watch)
+        real_time_factor = trial.stamp * 1e-9 / (time.monotonic() - begin)
+        truth = trial.world.truth()
     finally:
         if recording is not None:
             recording.close()
-    truth = trial.world.truth()
+        if trial is not None:
+            trial.close()
     return TrialSummary(
         mode="lockstep",
         seed=seed,
@@ -69,6 +76,6 @@ def play_lockstep(
         distance_walked=observer.distance,
         localization_error=observer.localization_error,
         heading_error=observer.heading_error,
-        real_time_factor=trial.stamp * 1e-9 / (time.monotonic() - begin),
+        real_time_factor=real_time_factor,
         recording=str(recording.path) if recording else "",
     )

@@ -49,12 +49,17 @@ class GameInputNode(ComponentNode):
         """
         super().__init__("game_input")
         self._settings = self.load(GameInputNodeParameters())
-        self._input = GameInput(self._settings)
-        self._complaints: dict[str, int] = {}  # reason: when it was given [ns]
-        self._stale = False
+        self.begin_anew()
+        self.follow_clock()
         self._socket = self._open()
         self._state = self.sender(topics.GAME_STATE)
         self.every(POLL, self._poll)
+
+    def begin_anew(self) -> None:
+        """Make the core, which waits for the first packet."""
+        self._input = GameInput(self._settings)
+        self._complaints: dict[str, int] = {}  # reason: when it was given [ns]
+        self._stale = False
 
     def destroy_node(self) -> None:
         """Close the socket and end the node."""
@@ -76,6 +81,8 @@ class GameInputNode(ComponentNode):
         return opened
 
     def _poll(self) -> None:
+        if self._now() == 0:
+            return  # time has not begun, or this node was restarted and has not heard of it: packets wait
         for _ in range(MOST_PACKETS):
             try:
                 data, sender = self._socket.recvfrom(DATAGRAM)

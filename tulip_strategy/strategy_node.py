@@ -28,8 +28,6 @@ from tulip_strategy.messages import (
 from tulip_strategy.parameters import StrategyParameters
 from tulip_strategy.strategy import Strategy
 
-NEW_GAME = 1_000_000_000  # [ns] a stamp this far back belongs to a simulation begun anew
-
 
 @dataclass(frozen=True)
 class StrategyNodeParameters(StrategyParameters):
@@ -49,11 +47,8 @@ class StrategyNode(ComponentNode):
             self._field = load_field(self._settings.field_file or None)
         except FieldError as error:
             raise BadInputError(f"Parameter field_file of node 'strategy': {error}") from error
-        self._strategy = Strategy(self._settings, self._field)
-        self._game: GameState | None = None
         self._user = UserCommand(0, UserRequest.STOP)
-        self._motion: MotionStateMessage | None = None
-        self._last_stamp = 0
+        self.begin_anew()
         self._walk = self.sender(topics.WALK_COMMAND)
         self._head = self.sender(topics.HEAD_COMMAND)
         self._decision = self.sender(topics.DECISION)
@@ -62,6 +57,12 @@ class StrategyNode(ComponentNode):
         self.listen(topics.GAME_STATE, self._on_game_state)
         self.listen(topics.USER_COMMAND, self._on_user_command)
         self.listen(topics.MOTION_STATE, self._on_motion_state)
+
+    def begin_anew(self) -> None:
+        """Make the core and wait for the game; the user's wish holds until user input sends the next."""
+        self._strategy = Strategy(self._settings, self._field)
+        self._game: GameState | None = None
+        self._motion: MotionStateMessage | None = None
 
     def _on_game_state(self, message: GameStateMessage) -> None:
         self._game = game_state_from_message(message)
@@ -74,10 +75,6 @@ class StrategyNode(ComponentNode):
 
     def _on_world_state(self, message: WorldStateMessage) -> None:
         world = world_state_from_message(message)
-        if world.stamp < self._last_stamp - NEW_GAME:
-            self.get_logger().info("time went back: strategy begins anew")
-            self._strategy, self._game = Strategy(self._settings, self._field), None
-        self._last_stamp = world.stamp
         motion = None if self._motion is None else motion_state_from_message(self._motion)
         decision = self._strategy.decide(world.stamp, world, self._game, self._user, motion)
         self._walk.publish(walk_command_to_message(decision.walk))

@@ -31,15 +31,21 @@ class UserInputNode(ComponentNode):
             BadInputError: if the strategy to begin with is not known.
         """
         super().__init__("user_input")
-        try:
-            self._input = UserInput(self.load(UserInputParameters()), tuple(STRATEGIES))
-        except ValueError as error:
-            raise BadInputError(f"Parameters of node 'user_input': {error}") from error
+        self._settings = self.load(UserInputParameters())
         self._command = self.sender(topics.USER_COMMAND)
-        self._publish()
+        self.begin_anew()
+        self.follow_clock()
         self.create_service(topics.SET_USER_COMMAND.type, topics.SET_USER_COMMAND.name, self._on_wish)
         for service, request in TRIGGERS.items():
             self.create_service(service.type, service.name, self._trigger(request))
+
+    def begin_anew(self) -> None:
+        """Make the core and publish the wish that it starts with."""
+        try:
+            self._input = UserInput(self._settings, tuple(STRATEGIES), self._now())
+        except ValueError as error:
+            raise BadInputError(f"Parameters of node 'user_input': {error}") from error
+        self._publish()
 
     def _on_wish(self, request: Any, response: Any) -> Any:
         forward, left, turning = (float(value) for value in request.velocity)

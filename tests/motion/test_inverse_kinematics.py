@@ -12,7 +12,7 @@ from tulip_description.model import floating_model, joint_indices, sole_model
 from tulip_description.planar import Pose2D
 from tulip_description.posture import standing_posture
 from tulip_description.robot import load_robot
-from tulip_motion.feedforward import feedforward
+from tulip_motion.feedforward import distance_share, feedforward
 from tulip_motion.gait import FootMotion
 from tulip_motion.interface import Side
 from tulip_motion.inverse_kinematics import (
@@ -178,8 +178,8 @@ def test_feedforward_on_one_foot_is_the_inverse_dynamics_of_the_model_rooted_the
         np.concatenate([base, accelerations]),
         kinematics.sole_positions,
         kinematics.sole_jacobians,
-        aims,
         float(stance),
+        aims,
     )
     rooted = sole_model(ROBOT, stance.name.lower())
     order = joint_indices(rooted, ROBOT)
@@ -202,8 +202,40 @@ def test_feedforward_on_both_feet_needs_no_tilting_moment_at_the_ankles() -> Non
         zero,
         kinematics.sole_positions,
         kinematics.sole_jacobians,
-        aims,
         0.5,
+        aims,
     )
     # The feet weigh little and stand under their ankles: only their own CoM offset loads the roll axes.
     assert np.abs(torques[[5, 11]]).max() < 0.1
+
+
+def test_eq_15_as_printed_blends_the_torques_of_the_models_rooted_in_either_foot() -> None:
+    kinematics = solver()
+    kinematics.update_jacobian(Side.LEFT)
+    zero = np.zeros(18)
+    alpha = 0.3
+    torques = feedforward(
+        MODEL,
+        kinematics.data,
+        kinematics.configuration,
+        zero,
+        zero,
+        kinematics.sole_positions,
+        kinematics.sole_jacobians,
+        alpha,
+    )
+    expected = np.zeros(12)
+    for side, share in ((Side.LEFT, 1.0 - alpha), (Side.RIGHT, alpha)):
+        rooted = sole_model(ROBOT, side.name.lower())
+        order = joint_indices(rooted, ROBOT)
+        q = np.empty(12)
+        q[order] = kinematics.joint_positions
+        expected += share * pin.rnea(rooted, rooted.createData(), q, np.zeros(12), np.zeros(12))[order]
+    np.testing.assert_allclose(torques, expected, atol=1e-8)
+
+
+def test_alpha_from_distances_is_one_over_the_right_foot_and_zero_over_the_left() -> None:
+    left, right = np.array([0.0, 0.12, 0.0]), np.array([0.0, -0.12, 0.0])
+    assert distance_share(right, left, right) == 1.0
+    assert distance_share(left, left, right) == 0.0
+    assert distance_share(np.array([0.0, 0.0, 0.7]), left, right) == pytest.approx(0.5)

@@ -7,11 +7,12 @@ from collections.abc import Callable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Selector, Sequence
+from py_trees.composites import Selector
+from py_trees.decorators import EternalGuard
 
 from tulip_description.planar import Pose2D
 from tulip_motion.interface import KickGoal, MotionMode, Side, WalkMode
-from tulip_strategy.behaviour.base import Act, Condition, Leaf
+from tulip_strategy.behaviour.base import Act, Leaf
 from tulip_strategy.behaviour.context import Context
 from tulip_strategy.behaviour.dribble_and_kick import dribble_and_kick
 from tulip_strategy.behaviour.gaze import look_ahead, look_for_ball, track_ball
@@ -74,10 +75,8 @@ def _playing(context: Context) -> Behaviour:
     return playing
 
 
-def _when(name: str, context: Context, test: Callable[[Context], bool], then: Behaviour) -> Sequence:
-    sequence = Sequence(name, memory=False)
-    sequence.add_children([Condition(f"{name}?", context, test), then])
-    return sequence
+def _when(name: str, context: Context, test: Callable[[Context], bool], then: Behaviour) -> Behaviour:
+    return EternalGuard(name, then, lambda: test(context))
 
 
 def _still(name: str, context: Context) -> Act:
