@@ -31,6 +31,7 @@ class MotionParameters:
     max_turn_rate: float = 1.0  # [rad/s]
     max_speed_change: float = 0.10  # [m/s] a step; larger jumps move the DCM reference too far
     max_turn_change: float = 0.4  # [rad/s] a step
+    max_heading_correction: float = 0.2  # [rad] a step; a robot that was turned by force gives way
     min_foot_distance: float = 0.165  # [m] sideways between the ankles; soles are 0.15 m wide
     max_foot_distance: float = 0.42  # [m] sideways between the ankles, from the reach of the hip roll
     max_stride: float = 0.36  # [m] forward between the ankles, from the reach of the straight leg

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from tulip_description.planar import Pose2D
+from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.footsteps import Footstep, plan_footsteps
 from tulip_motion.gait import FootMotion, Reference, SwingFoot, sole_point, support_on
 from tulip_motion.interface import Side, Support
@@ -42,6 +42,7 @@ class Walking:
         self._zmp = zmp
         self._stance: Footstep | None = None
         self._closing = False
+        self._heading: float | None = None
         self._swing: SwingFoot | None = None
 
     def tick(
@@ -94,7 +95,8 @@ class Walking:
         if was_closing and self._closing:
             self._begin_stop()
             return
-        steps = plan_footsteps(stance, self.velocity, p.step_time, p.stance_width, PREVIEW_STEPS)
+        steps = plan_footsteps(self._straightened(stance), self.velocity, p.step_time, p.stance_width, PREVIEW_STEPS)
+        self._heading = steps[0].pose.yaw
         self._target = self._nominal = steps[0].pose
         swing_time = p.step_time - p.double_support_time
         self._landing_time = shift_time + swing_time
@@ -105,6 +107,17 @@ class Walking:
             zmps += [aim, aim]
         middle = ((zmps[-1][0] + zmps[-3][0]) / 2.0, (zmps[-1][1] + zmps[-3][1]) / 2.0)
         self._plan = DcmPlan([*times, times[-1] + p.stop_shift_time], [*zmps, middle], self._time_constant)
+
+    def _straightened(self, stance: Footstep) -> Footstep:
+        """Return the stance foot with the heading that it was meant to have.
+
+        Feet land turned by some hundredths of a radian; planned from where they look, the robot would wander off.
+        """
+        pose, most = stance.pose, self._parameters.max_heading_correction
+        if self._heading is None:
+            return stance
+        correction = min(max(wrap_angle(self._heading - pose.yaw), -most), most)
+        return Footstep(stance.side, Pose2D(pose.x, pose.y, pose.yaw + correction))
 
     def _begin_stop(self) -> None:
         p = self._parameters

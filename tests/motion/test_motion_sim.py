@@ -137,3 +137,12 @@ def test_torques_stay_inside_the_robots_limits_while_walking_fast() -> None:
         peak = np.maximum(peak, np.abs(run.world.sensors().joint_efforts))
     assert run.motion.mode is MotionMode.WALK
     assert np.all(peak <= limits)
+
+
+def test_heading_is_held_while_walking_fast() -> None:
+    run = Run(seed=3)
+    run.go(0.3)
+    run.go(10.0, walk(0.6))
+    _, _, z, w = run.world.truth().base_orientation
+    assert abs(2.0 * np.arctan2(z, w)) < 0.05  # the IMU's own drift is up to 0.01 rad in this time
+    assert abs(run.world.truth().base_position[1]) < 0.3
