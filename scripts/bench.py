@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.markdown import Markdown
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from tulip_ros.errors import EXIT_BAD_INPUT
+from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
 from tulip_sim.bench import kick, trial, walk
 from tulip_sim.bench.runner import Row, run, save, write_results
 
@@ -31,9 +31,14 @@ def main(
     json_path: Annotated[Path | None, typer.Option("--json", help="Write the rows to this file, too.")] = None,
 ) -> None:
     """Run a bench."""
-    if name not in BENCHES:
-        print(f"error: bench is {name!r}; expected one of {', '.join(BENCHES)}.", file=sys.stderr)
-        raise typer.Exit(EXIT_BAD_INPUT)
+    try:
+        if name not in BENCHES:
+            raise unknown("bench", name, BENCHES)
+        if json_path is not None:
+            check_writable(json_path, "--json")
+    except BadInputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise typer.Exit(EXIT_BAD_INPUT) from None
     bench, console = BENCHES[name], Console()
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console) as bar:

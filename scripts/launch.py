@@ -17,11 +17,12 @@ from rich.console import Console
 from rich.live import Live
 
 from tulip_ros import plan
-from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
+from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, unknown
 from tulip_ros.launch import Launcher
 from tulip_ros.monitor import Monitor
 from tulip_ros.nodes import ROBOT
 from tulip_ros.run import ComponentNode, session
+from tulip_ros.transport import NAMES as TRANSPORTS
 
 LOOK = 0.2  # [s] between two looks at the processes
 
@@ -39,11 +40,13 @@ def main(
 ) -> None:
     """Start nodes and keep them running."""
     try:
+        if transport not in TRANSPORTS:
+            raise unknown("transport", transport, TRANSPORTS)
         names = list(nodes or ROBOT) + (["recorder"] if record else [])
         values = {"recorder": {"path": str(record.absolute())}} if record else {}
         starts = plan.make_plan(names, None if driver == "none" else driver, namespace, parameters or (), values)
         keep_running(Launcher(starts, logs, transport), namespace)
-    except (BadInputError, ValueError) as error:
+    except BadInputError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from None
 

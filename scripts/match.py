@@ -8,6 +8,7 @@ if __name__ == "__main__":
     _environment.prepare()
 
 import json
+import signal
 import sys
 from datetime import datetime
 from pathlib import Path
@@ -18,7 +19,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
+from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
 from tulip_sim.match_graph import play_graph
 from tulip_sim.match_lockstep import play_lockstep
 from tulip_sim.scenario import SCENARIOS
@@ -26,6 +27,7 @@ from tulip_sim.trial import TrialSummary
 from tulip_strategy.game_controller import REFEREE_PORT
 
 MODES = ("graph", "lockstep")
+INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 LONGEST = 155.0  # [s] preparation and 150 s of play
 
 
@@ -37,16 +39,23 @@ def main(
     no_record: Annotated[bool, typer.Option("--no-record", help="Record nothing.")] = False,
     json_path: Annotated[Path | None, typer.Option("--json", help="Write the summary to this file.")] = None,
     parameters: Annotated[list[Path] | None, typer.Option(help="YAML file for the nodes (graph); repeatable.")] = None,
-    referee_port: Annotated[int, typer.Option(help="UDP port of the referee (graph).")] = REFEREE_PORT,
+    referee_port: Annotated[
+        int, typer.Option(help="UDP port of the referee (graph).", min=1, max=65535)
+    ] = REFEREE_PORT,
     logs: Annotated[Path | None, typer.Option(help="Folder for one log file a node (graph).")] = None,
 ) -> None:
-    """Play one trial. The exit code is 0 after a goal, 1 without one, 2 for bad input."""
+    """Play one trial. The exit code is 0 after a goal, 1 without one, 2 for bad input, 130 after Ctrl-C."""
+    folder: Path | None = None
     console = Console()
     try:
         if mode not in MODES:
             raise BadInputError(f"--mode is {mode!r}; expected one of {', '.join(MODES)}.")
+        if scenario not in SCENARIOS:
+            raise unknown("scenario", scenario, SCENARIOS)
+        if mode != "graph" and (parameters or logs):
+            raise BadInputError("--parameters and --logs are for nodes; expected --mode graph with them.")
         if json_path is not None:
-            check_writable(json_path)
+            check_writable(json_path, "--json")
         folder = None if no_record else record or default_folder(seed, mode)
         with Progress(
             TextColumn("{task.description}", justify="left"),
@@ -74,12 +83,13 @@ def main(
                 )
             else:
                 summary = play_lockstep(seed, scenario, record=folder, progress=show)
-    except (BadInputError, ValueError) as error:
+    except BadInputError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from None
     except KeyboardInterrupt:
-        console.print("stopped; the recording holds what was played")
-        raise typer.Exit(1) from None
+        held = f"; {folder} holds what was played" if folder is not None and folder.exists() else ""
+        print(f"stopped{held}", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None
     report(summary, console)
     if json_path is not None:
         json_path.write_text(json.dumps(summary.as_dict(), indent=2) + "\n")
@@ -90,18 +100,6 @@ def default_folder(seed: int, mode: str) -> Path:
     """Return a new folder under recordings/."""
     moment = datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
     return _environment.ROOT / "recordings" / f"{moment}_{mode}_{seed}"
-
-
-def check_writable(path: Path) -> None:
-    """Refuse a file that cannot be written before the trial, not after it.
-
-    Raises:
-        BadInputError: if it cannot be written.
-    """
-    try:
-        path.touch()
-    except OSError as error:
-        raise BadInputError(f"--json {path} cannot be written: {error.strerror}. Name another file.") from error
 
 
 def report(summary: TrialSummary, console: Console) -> None:
@@ -115,4 +113,5 @@ def report(summary: TrialSummary, console: Console) -> None:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     typer.run(main)

@@ -12,12 +12,14 @@ def main() -> int:
     import typer
 
     from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
+    from tulip_ros.plan import check_namespace
     from tulip_strategy import menu_node
 
     def menu(namespace: str = typer.Option("", help="Namespace of the robot, as in /striker.")) -> None:
         """Tell the robot what to do: start, stop, stand, walk test, kick test, limp, strategy."""
-        remap = ["-r", f"__ns:=/{namespace.strip('/')}"] if namespace.strip("/") else []
         try:
+            namespace = check_namespace(namespace)
+            remap = ["-r", f"__ns:=/{namespace}"] if namespace else []
             menu_node.main([sys.argv[0], "--ros-args", *remap])
         except BadInputError as error:
             typer.echo(f"error: {error}", err=True)

@@ -13,7 +13,8 @@ from typing import Annotated
 
 import typer
 
-from tulip_ros.errors import EXIT_BAD_INPUT
+from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
+from tulip_ros.plan import check_namespace
 from tulip_ros.recorder_node import RecorderNode, RecorderParameters
 from tulip_ros.run import run
 
@@ -30,10 +31,11 @@ def main(
 ) -> None:
     """Record all topics, or those that match."""
     try:
+        namespace = check_namespace(namespace)
         settings = RecorderParameters(
             path=str(path) if path else "", include=tuple(include or ()), exclude=tuple(exclude or ())
         )
-    except ValueError as error:
+    except (BadInputError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from None
     run(lambda: RecorderNode(settings, namespace), arguments=[])

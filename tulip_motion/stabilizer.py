@@ -36,7 +36,8 @@ def stabilize(
 
     Args:
         parameters: Of motion control.
-        zmp, dcm_planned: Reference in odom [m].
+        zmp: Reference in odom [m].
+        dcm_planned: Reference in odom [m].
         dcm: Measured in odom [m].
         stance: The foot that stands.
         other: The other foot if it stands as well, else None.

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from pathlib import Path
 
 EXIT_BAD_INPUT = 2
 """Exit code of a program that was given something it cannot use."""
+
+MOST_NAMES = 12
+"""More known names than this are not listed when one of them was probably meant."""
 
 
 class BadInputError(Exception):
@@ -22,6 +26,27 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> BadInputError:
         known: The names that exist.
     """
     names = sorted(known)
-    near = difflib.get_close_matches(name, names, n=1)
-    hint = f" Did you mean {near[0]}?" if near else ""
-    return BadInputError(f"There is no {kind} {name!r}.{hint} Known: {', '.join(names) or 'none'}.")
+    near = difflib.get_close_matches(name, names, n=3)
+    hint = f" Did you mean {' or '.join(near)}?" if near else ""
+    names_shown = "" if near and len(names) > MOST_NAMES else f" Known: {', '.join(names) or 'none'}."
+    return BadInputError(f"There is no {kind} {name!r}.{hint}{names_shown}")
+
+
+def check_writable(path: Path, option: str) -> None:
+    """Refuse a file that cannot be written, before the work for it is done.
+
+    Args:
+        path: The file.
+        option: Where its name came from, as in "--json".
+
+    Raises:
+        BadInputError: if it cannot be written.
+    """
+    existed = path.exists()
+    try:
+        with open(path, "ab"):
+            pass
+        if not existed:
+            path.unlink()
+    except OSError as error:
+        raise BadInputError(f"{option} {path} cannot be written: {error.strerror}. Name another file.") from error

@@ -39,6 +39,10 @@ class Health:
         self._inputs[topic_name] += 1
         self._newest = max(self._newest, stamp)
 
+    def begin_anew(self) -> None:
+        """Forget the newest stamp: time began anew."""
+        self._newest = 0
+
     def count(self, event: str, warning: str = "") -> None:
         """Count an event.
 

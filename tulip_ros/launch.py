@@ -106,10 +106,12 @@ class Launcher:
         return tuple(process.state() for process in self._processes)
 
     def stop(self) -> None:
-        """End all processes: the recorder last, so that it sees the others end."""
+        """End all processes: the recorder last, so that it sees the others end. Leave nothing of theirs behind."""
         recorders = [process for process in self._processes if process.name == "recorder"]
         _end([process for process in self._processes if process not in recorders])
         _end(recorders)
+        if any(process.was_killed for process in self._processes):
+            transport.remove_leftovers()
 
 
 class _Process:
@@ -125,6 +127,7 @@ class _Process:
         self._given_up = False
         self._ended = False
         self._exit_code: int | None = None
+        self.was_killed = False  # at any time: it could not remove its shared memory then
 
     def start(self) -> None:
         with open(self._log, "ab") as log:
@@ -152,9 +155,10 @@ class _Process:
         if code is None:
             return []
         self._process, self._exit_code = None, code
+        self.was_killed |= code < 0
         if code == EXIT_BAD_INPUT:
             self._given_up = True
-            raise BadInputError(f"Node {self.name} refused what it was given:\n{self._tail()}")
+            raise BadInputError(f"Node {self.name} refused what it was given: {self._refusal()}")
         self._deaths = 1 if now - self._started > SETTLED else self._deaths + 1
         if self._deaths >= DEATHS:
             self._given_up = True
@@ -188,7 +192,13 @@ class _Process:
     def forget(self) -> None:
         if self._process is not None:
             self._exit_code = self._process.wait()
+            self.was_killed |= self._exit_code < 0
         self._process, self._ended = None, True
+
+    def _refusal(self) -> str:
+        """Return the node's own words: what follows "error: " in its log."""
+        _, mark, words = self._log.read_text(errors="replace").rpartition("error: ")
+        return words.strip() if mark else f"the end of its log:\n{self._tail()}"
 
     def _tail(self) -> str:
         lines = self._log.read_text(errors="replace").splitlines()

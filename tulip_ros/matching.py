@@ -31,16 +31,13 @@ class SameStamp:
 
         Args:
             name: One of the names given at the start.
-            stamp: Of the message [ns]. One far before the last complete instant means that time began anew.
+            stamp: Of the message [ns].
             message: Anything.
         """
         if name not in self._names:
             raise ValueError(f"name is {name!r}; expected one of {', '.join(self._names)}")
         if stamp <= self._last:
-            if self._last - stamp < 1_000_000_000:
-                return None  # late: its instant was given up, or it came twice
-            self._waiting.clear()
-            self._last = -1
+            return None  # late: its instant was given up, or it came twice
         instant = self._waiting.setdefault(stamp, {})
         instant[name] = message
         if len(instant) < len(self._names):

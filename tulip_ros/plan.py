@@ -75,9 +75,7 @@ def make_plan(
     entries = [find_driver(driver)] if driver else []
     entries += [find_node(name) for name in dict.fromkeys(nodes or ROBOT)]
     entries.sort(key=lambda entry: entry.name != "recorder")  # starts first, so that it misses nothing
-    namespace = namespace.strip("/")
-    if namespace and not NAMESPACE.fullmatch(namespace):
-        raise BadInputError(f"Namespace is {namespace!r}; expected letters, digits and _, as in striker.")
+    namespace = check_namespace(namespace)
     given: list[Mapping[str, Values]] = [read_parameters(path) for path in parameter_files]
     if values:
         given.append(values)
@@ -92,6 +90,18 @@ def make_plan(
     return tuple(starts)
 
 
+def check_namespace(namespace: str) -> str:
+    """Return a namespace without slashes around it.
+
+    Raises:
+        BadInputError: if ROS would not take it.
+    """
+    namespace = namespace.strip("/")
+    if namespace and not NAMESPACE.fullmatch(namespace):
+        raise BadInputError(f"Namespace is {namespace!r}; expected letters, digits and _, as in striker.")
+    return namespace
+
+
 def read_parameters(path: Path) -> dict[str, Values]:
     """Read a parameter file: `node: {name: value}`, or ROS's form with ros__parameters in between.
 
@@ -103,7 +113,7 @@ def read_parameters(path: Path) -> dict[str, Values]:
     except OSError as error:
         raise BadInputError(f"Parameter file {path} cannot be read: {error.strerror}.") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise BadInputError(f"Parameter file {path} is no valid YAML: {error}") from error
+        raise BadInputError(f"Parameter file {path} is no valid YAML: {_what_is_wrong(error)}.") from error
     if content is None:
         return {}
     if not isinstance(content, dict):
@@ -119,6 +129,14 @@ def read_parameters(path: Path) -> dict[str, Values]:
             raise BadInputError(f"Parameter file {path}: {key} holds {block!r}; expected `name: value` lines.")
         result[name] = block
     return result
+
+
+def _what_is_wrong(error: yaml.YAMLError | UnicodeDecodeError) -> str:
+    """Return a parser's complaint in one line."""
+    if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
+        mark = error.problem_mark
+        return f"{error.problem} in line {mark.line + 1}, column {mark.column + 1}"
+    return " ".join(str(error).split())
 
 
 def merge(values: dict[str, Any], newer: Values) -> None:

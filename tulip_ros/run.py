@@ -5,9 +5,13 @@ A node's module is thin:
     class VisionNode(ComponentNode):
         def __init__(self) -> None:
             super().__init__("vision")
-            self.core = Vision(self.load(VisionParameters()))
+            self.settings = self.load(VisionParameters())
+            self.core = Vision(self.settings)
             self.features = self.sender(topics.FEATURES)
             self.listen(topics.CAMERA_IMAGE, self.on_image)
+
+        def begin_anew(self) -> None:
+            self.core = Vision(self.settings)
 
     if __name__ == "__main__":
         run(VisionNode)
@@ -22,7 +26,8 @@ from contextlib import contextmanager
 from typing import Any, NoReturn, TypeVar
 
 import rclpy
-from rclpy.clock import Clock, ClockType
+from rclpy.clock import Clock, ClockType, JumpThreshold
+from rclpy.duration import Duration
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -36,6 +41,7 @@ from tulip_ros import parameters, transport
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, unknown
 from tulip_ros.health import Health
 from tulip_ros.time import stamp_of
+from tulip_ros.timeline import JUMP, Arrival, Timeline
 from tulip_ros.topics import Topic
 
 P = TypeVar("P")
@@ -62,6 +68,7 @@ class ComponentNode(Node):
         """
         super().__init__(name, **options)
         self.health = Health(self)
+        self._timeline = Timeline()
 
     def load(self, defaults: P) -> P:
         """Declare a core's parameters and return them with the user's values.
@@ -78,16 +85,50 @@ class ComponentNode(Node):
         """Return the publisher of a topic. Its `publish` takes messages, or bytes of a serialized one."""
         return topic.publish_from(self)
 
-    def listen(self, topic: Topic, callback: Callable[[Any], None]) -> Subscription:
-        """Call back with each message of a topic; the messages are counted for the diagnostics."""
+    def listen(self, topic: Topic, callback: Callable[[Any], None], depth: int | None = None) -> Subscription:
+        """Call back with each message of a topic; the messages are counted for the diagnostics.
+
+        When stamps jump back, the simulation was begun anew: `begin_anew` is called first, and messages from before
+        that other topics still deliver are dropped. Latched topics tell no time, since their last message may be old,
+        nor do topics of several senders, each of which is at another stamp.
+
+        Args:
+            topic: One of `tulip_ros.topics`.
+            callback: Is given each message.
+            depth: How many messages wait while this node is busy, if it needs more than the topic's own.
+        """
         has_header = "header" in topic.message.get_fields_and_field_types()
-        received, name = self.health.received, topic.name
+        tells_time = has_header and not topic.quality.latched and len(topic.publishers) == 1
+        received, see, name = self.health.received, self._timeline.see, topic.name
 
         def counted(message: Any) -> None:
-            received(name, stamp_of(message) if has_header else 0)
+            stamp = stamp_of(message) if tells_time else 0
+            if tells_time:
+                arrival = see(name, stamp)
+                if arrival is Arrival.OLD:
+                    self.health.count("messages from before time began anew")
+                    return
+                if arrival is Arrival.ANEW:
+                    self._time_went_back()
+            received(name, stamp)
             callback(message)
 
-        return topic.subscribe_from(self, counted)
+        return topic.subscribe_from(self, counted, depth=depth)
+
+    def follow_clock(self) -> None:
+        """Begin anew when the node's clock jumps back: for a node that listens to nothing with a stamp."""
+        threshold = JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-JUMP), on_clock_change=False)
+        self._clock_jumps = self.get_clock().create_jump_callback(
+            threshold, post_callback=lambda _: self._time_went_back()
+        )
+
+    def begin_anew(self) -> None:
+        """Forget everything about the time before: the simulation was begun anew. For nodes to override."""
+
+    def _time_went_back(self) -> None:
+        self.get_logger().info("time went back: beginning anew")
+        self.health.begin_anew()
+        self.begin_anew()
 
     def every(self, period: float, callback: Callable[[], None]) -> Timer:
         """Call back every `period` [s] of wall-clock time: for sockets and keyboards, never for control."""

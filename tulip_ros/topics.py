@@ -6,7 +6,7 @@ Names are relative, so a namespace holds a whole robot. `/clock` alone is shared
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -100,15 +100,19 @@ class Topic:
         """Create this topic's publisher in a node."""
         return node.create_publisher(self.message, self.name, self.quality.profile())
 
-    def subscribe_from(self, node: Node, callback: Callable[[Any], None], raw: bool = False) -> Subscription:
+    def subscribe_from(
+        self, node: Node, callback: Callable[[Any], None], raw: bool = False, depth: int | None = None
+    ) -> Subscription:
         """Create a subscription to this topic in a node.
 
         Args:
             node: The node.
             callback: Is given each message.
             raw: Give the callback the serialized message (bytes) instead.
+            depth: How many messages wait for this listener; as many as for any other by default.
         """
-        return node.create_subscription(self.message, self.name, callback, self.quality.profile(), raw=raw)
+        quality = self.quality if depth is None else replace(self.quality, depth=depth)
+        return node.create_subscription(self.message, self.name, callback, quality.profile(), raw=raw)
 
 
 @dataclass(frozen=True)

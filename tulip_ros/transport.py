@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -41,7 +43,8 @@ def remove_leftovers() -> None:
     """Remove shared memory of processes that were killed; what a living process holds stays.
 
     Each killed process leaves 17 MB. Fast DDS's own tool tells by file locks which are dead; without the tool nothing
-    happens.
+    happens. The tool misses ports that other processes had open when one was killed: their users were counted, and the
+    count never comes to zero, though their owner removed its lock. Such a port that no process maps goes as well.
     """
     own = Path(sys.prefix) / "tools" / "fastdds" / "fastdds.py"
     tool = shutil.which("fastdds")
@@ -49,6 +52,21 @@ def remove_leftovers() -> None:
     if command is None or not any(SHARED_MEMORY.glob("fastrtps_*")):
         return
     subprocess.run([*command, "shm", "clean"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
+    ports = {path for path in SHARED_MEMORY.glob("fastrtps_port*") if path.name[-1].isdigit()}
+    for port in ports - _mapped():
+        if not any(SHARED_MEMORY.glob(f"{port.name}_?l")):  # no lock
+            for leftover in (port, SHARED_MEMORY / f"sem.{port.name}_mutex"):
+                with contextlib.suppress(OSError):  # gone by now, or another user's
+                    leftover.unlink()
+
+
+def _mapped() -> set[Path]:
+    """Return the files of Fast DDS in shared memory that a process has open, as far as this user may look."""
+    found: set[Path] = set()
+    for maps in Path("/proc").glob("[0-9]*/maps"):
+        with contextlib.suppress(OSError):  # ended, or another user's
+            found |= {Path(path) for path in re.findall(rf"{SHARED_MEMORY}/fastrtps_\S+", maps.read_text())}
+    return found
 
 
 def _free_shared_memory() -> int:

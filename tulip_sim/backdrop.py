@@ -21,11 +21,12 @@ Bytes = NDArray[np.uint8]
 Float = NDArray[np.float32]
 
 BLOCK = 4  # [px] between two rays
-STRIP = 20  # [px], a multiple of BLOCK; rows that share one resolution of the ground
+STRIP = 20  # [px], a multiple of BLOCK; fewest rows that share one resolution of the ground
 SHARPNESS = 1.4  # width of a ground pixel over that of a camera pixel: more blurs, less flickers
 SPACING = 2.0  # [ground pixels] between samples: bilinear reading is about that wide
 MOST_SAMPLES = 6  # along the ground that one pixel sees
 LOWEST = 0.03  # [m] a camera that lies on the ground is drawn as if this high
+WALL_GAP = 0.5  # [m] least distance to the wall from which it is drawn, for a camera outside the hall too
 STEEPEST = 1e-3  # smallest downward part of a ray that is followed to the ground
 
 
@@ -69,39 +70,81 @@ class Backdrop:
         steepness = -directions[2]
         reach = np.float32(height) / np.maximum(steepness, np.float32(STEEPEST))
         ground = np.stack([directions[0] * reach + np.float32(x), directions[1] * reach + np.float32(y)], axis=2)
+        sees_ground = steepness > STEEPEST
+        if math.hypot(x, y) < self._wall_radius - WALL_GAP:  # else the wall stands in no ray's way
+            within = np.float32((self._wall_radius + WALL_GAP) ** 2)
+            sees_ground &= ground[..., 0] ** 2 + ground[..., 1] ** 2 < within
         ground -= np.array([self._ground.left, self._ground.lower], np.float32)
         index = np.zeros((self._height, self._width), np.uint8)
-        for row in range(0, self._height, STRIP):
-            blocks = slice(row // BLOCK, row // BLOCK + STRIP // BLOCK + 2)
-            if float(steepness[blocks].max()) > STEEPEST:
-                ahead = float(steepness[blocks].mean())
-                self._draw_ground(index[row : row + STRIP], ground[blocks], height, ahead)
+        for first, last, level, samples in self._strips(sees_ground.any(axis=1), steepness.mean(axis=1), height):
+            blocks = ground[first // BLOCK : -(-last // BLOCK) + 2]
+            self._draw_ground(index[first:last], blocks, level, samples)
         picture = np.asarray(cv2.applyColorMap(index, self._palette), np.uint8)
         self._draw_wall(picture, directions, (x, y, height))
         return picture
 
-    def _draw_ground(self, index: Bytes, ground: Float, height: float, ahead: float) -> None:
+    def _strips(self, sees_ground: NDArray[np.bool_], ahead: Float, height: float) -> list[tuple[int, int, int, int]]:
+        """Divide the rows that see ground into strips to be drawn alike.
+
+        Args:
+            sees_ground: (blocks,) whether any ray meets the ground before the wall.
+            ahead: (blocks,) mean downward part of the rays.
+            height: Of the camera [m].
+
+        Returns:
+            For each strip its first row, the row after its last, the level of the ground's picture to read, and the
+            number of samples along the ground for each row.
+        """
+        seen, means = sees_ground.tolist(), ahead.tolist()
+        strips: list[tuple[int, int, int, int]] = []
+        count = STRIP // BLOCK + 2
+        for row in range(0, self._height, STRIP):
+            blocks = slice(row // BLOCK, row // BLOCK + count)
+            if not any(seen[blocks]):
+                continue
+            level, samples = self._resolution(height, sum(means[blocks]) / len(means[blocks]))
+            last = min(row + STRIP, self._height)
+            if strips and strips[-1][1:] == (row, level, samples):
+                strips[-1] = (strips[-1][0], last, level, samples)
+            else:
+                strips.append((row, last, level, samples))
+        return strips
+
+    def _resolution(self, height: float, ahead: float) -> tuple[int, int]:
+        """Return the level of the ground's picture to read, and how many samples along the ground a pixel needs.
+
+        Args:
+            height: Of the camera [m].
+            ahead: Downward part of the ray in the middle of some rows.
+        """
+        reach = height / max(ahead, 0.02)  # [m] range to the ground in the middle of the strip
+        across = reach / self._focal  # [m] ground that one pixel sees, sideways
+        along = across * reach / height  # and away from the camera
+        level = round(math.log2(max(SHARPNESS * across / self._ground.resolution(0), 1.0)))
+        level = min(level, len(self._ground.levels) - 1)
+        samples = min(max(math.ceil(along / (SPACING * self._ground.resolution(level))), 1), MOST_SAMPLES)
+        return level, samples
+
+    def _draw_ground(self, index: Bytes, ground: Float, level: int, samples: int) -> None:
         """Fill rows of the index picture.
 
         Args:
             index: The rows, drawn into.
             ground: (blocks, columns, 2) where rays meet the ground [m], from the corner of its pictures.
-            height: Of the camera [m].
-            ahead: Downward part of the ray in the middle of the rows.
+            level: Of the ground's picture to read.
+            samples: For each row.
         """
-        reach = height / max(ahead, 0.02)  # [m] range to the ground in the middle of the strip
-        across = reach / self._focal  # [m] ground that one pixel sees, sideways
-        along = across * reach / height  # and away from the camera
-        levels = self._ground.levels
-        level = round(math.log2(max(SHARPNESS * across / self._ground.resolution(0), 1.0)))
-        level = min(level, len(levels) - 1)
-        pixel = self._ground.resolution(level)
-        samples = min(max(math.ceil(along / (SPACING * pixel)), 1), MOST_SAMPLES)
-        places = self._finer(ground / np.float32(pixel) - np.float32(0.5), BLOCK * samples, BLOCK)
+        pixel = np.float32(self._ground.resolution(level))
+        places = self._finer(ground / pixel - np.float32(0.5), BLOCK * samples, BLOCK)
         rows = index.shape[0]
         places = places[: rows * samples, : self._width]
         read = cv2.remap(
-            levels[level], places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=FLOOR
+            self._ground.levels[level],
+            places,
+            None,
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=FLOOR,
         )
         if samples == 1:
             index[:] = read
@@ -111,7 +154,7 @@ class Backdrop:
     def _draw_wall(self, picture: Bytes, directions: Float, camera: tuple[float, float, float]) -> None:
         """Draw the wall at half the resolution: it is a blurred background, and only its foot needs to be sharp."""
         x, y, height = camera
-        inside = min(1.0, (self._wall_radius - 0.5) / max(math.hypot(x, y), 1e-6))
+        inside = min(1.0, (self._wall_radius - WALL_GAP) / max(math.hypot(x, y), 1e-6))
         x, y = x * inside, y * inside
         # Rays that reach the ground before the wall can stand in their way are of no interest.
         nearest = self._wall_radius - math.hypot(x, y)

@@ -6,6 +6,7 @@ Backdrop (ground and wall) by rays, solids by anti-aliased polygons from far to 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -17,7 +18,7 @@ from tulip_description.keeper import TEAM_COLOURS
 from tulip_description.robot import Robot
 from tulip_sim.backdrop import Backdrop
 from tulip_sim.field_texture import ground_palette, paint_ground, paint_wall
-from tulip_sim.round_things import draw_ball, draw_shadow
+from tulip_sim.round_things import draw_ball, draw_shadows
 from tulip_sim.scene import (
     COLOURS,
     Body,
@@ -138,7 +139,8 @@ class CameraRenderer:
         share = np.linspace(0.0, 1.0, THREAD_PIECES + 1)[None, :, None]
         self._threads = threads[:, :1] + (threads[:, 1:] - threads[:, :1]) * share  # (n, THREAD_PIECES + 1, 3)
         self._gain = _sensor_gain(lens, parameters)
-        self._noise = _noise_tile(lens, parameters.noise, rng)
+        noise = _noise_tile(lens, parameters.noise, rng)
+        self._brighter, self._darker = np.maximum(noise, 128) - 128, 128 - np.minimum(noise, 128)
 
     def render(self, truth: Truth, rng: np.random.Generator) -> Bytes:
         """Return the (H, W, 3) BGR picture that the head camera takes of the world.
@@ -171,23 +173,21 @@ class CameraRenderer:
         ball_radius = self._field.ball_radius
         strength = self._parameters.shadow
         poles = self._pole_cylinders if scene.poles else ()
-        for spot in (*scene.shadows, *((float(pole.start[0]), float(pole.start[1]), POLE_SHADOW) for pole in poles)):
-            draw_shadow(picture, self._view, camera_in_map, spot, strength)
+        shadows = [(*spot, strength) for spot in scene.shadows]
+        shadows += [(float(pole.start[0]), float(pole.start[1]), POLE_SHADOW, strength) for pole in poles]
         if scene.ball is not None:
             # The shadow fades and widens as the ball leaves the ground.
             lift = max(float(scene.ball[2]) - ball_radius, 0.0) / ball_radius
-            spot = (float(scene.ball[0]), float(scene.ball[1]), ball_radius * (0.85 + 0.3 * lift))
-            draw_shadow(picture, self._view, camera_in_map, spot, strength * 1.2 / (1.2 + lift))
+            size, faded = ball_radius * (0.85 + 0.3 * lift), strength * 1.2 / (1.2 + lift)
+            shadows.append((float(scene.ball[0]), float(scene.ball[1]), size, faded))
+        draw_shadows(picture, self._view, camera_in_map, shadows)
         self._draw_nets(picture, camera_in_map)
         boxes = scene.boxes.inside(self._view, camera_in_map)
         faces = [box_faces(boxes.transforms, boxes.sizes, boxes.colours, eye)]
-        for cylinder in (*self._goal_cylinders, *poles):
-            if self._may_be_seen(cylinder, camera_in_map):
-                faces.append(
-                    cylinder_faces(
-                        cylinder.start, cylinder.end, cylinder.radius, cylinder.colours, eye, self._view.focal
-                    )
-                )
+        for cylinder in self._seen((*self._goal_cylinders, *poles), camera_in_map):
+            faces.append(
+                cylinder_faces(cylinder.start, cylinder.end, cylinder.radius, cylinder.colours, eye, self._view.focal)
+            )
         ball_distance = -1.0 if scene.ball is None else float(np.linalg.norm(scene.ball - eye)) - ball_radius
         ball_drawn = scene.ball is None
         for polygon in [*self._view.project(join(faces), camera_in_map), None]:
@@ -208,15 +208,16 @@ class CameraRenderer:
         """
         parameters = self._parameters
         if parameters.blur > 0.0:
-            size = 2 * math.ceil(2.0 * parameters.blur) + 1
+            size = 2 * math.ceil(1.6 * parameters.blur) + 1  # further out is less than one grey level
             picture = np.asarray(cv2.GaussianBlur(picture, (size, size), parameters.blur), np.uint8)
         flicker = max(1.0 + parameters.flicker * float(rng.standard_normal()), 0.1)
         picture = np.asarray(cv2.multiply(picture, self._gain, scale=flicker * self._gain_scale / 255.0), np.uint8)
         row, column = (int(offset) for offset in rng.integers(0, NOISE_MARGIN, 2))
         if parameters.noise > 0.0:
             height, width = picture.shape[:2]
-            noise = self._noise[row : row + height, column : column + width]
-            picture = np.asarray(cv2.addWeighted(picture, 1.0, noise, 1.0, -128.0), np.uint8)
+            part = slice(row, row + height), slice(column, column + width)
+            cv2.add(picture, self._brighter[part], dst=picture)
+            cv2.subtract(picture, self._darker[part], dst=picture)
         return picture
 
     @property
@@ -224,10 +225,13 @@ class CameraRenderer:
         p = self._parameters
         return p.brightness * max(p.blue_gain, p.green_gain, p.red_gain)
 
-    def _may_be_seen(self, cylinder: Cylinder, camera_in_map: Array) -> bool:
-        ends = (np.stack([cylinder.start, cylinder.end]) - camera_in_map[:3, 3]) @ camera_in_map[:3, :3]
-        reach = cylinder.radius * self._view.steepest
-        return bool((self._view.inside(ends).max(axis=0) > -reach).all())
+    def _seen(self, cylinders: Sequence[Cylinder], camera_in_map: Array) -> list[Cylinder]:
+        """Return those that a camera may see."""
+        ends = np.array([(each.start, each.end) for each in cylinders]) - camera_in_map[:3, 3]
+        depths = self._view.inside(ends @ camera_in_map[:3, :3]).max(axis=1)  # of the better end: (n, 5)
+        reach = np.array([each.radius for each in cylinders]) * self._view.steepest
+        seen = (depths > -reach[:, None]).all(axis=1)
+        return [each for each, may_be in zip(cylinders, seen.tolist(), strict=True) if may_be]
 
     def _draw_nets(self, picture: Bytes, camera_in_map: Array) -> None:
         points = (self._threads - camera_in_map[:3, 3]) @ camera_in_map[:3, :3]
@@ -238,13 +242,19 @@ class CameraRenderer:
             return
         pixels = self._view.lens.project(np.where(inside.reshape(-1, 1), flat, np.array([0.0, 0.0, 1.0])))
         fixed = np.round(pixels.reshape(*points.shape[:2], 2) * (1 << SHIFT)).astype(np.int32)
-        pieces = np.stack([fixed[:, :-1][seen], fixed[:, 1:][seen]], axis=1)
+        whole = seen.all(axis=1)
+        parts = seen & ~whole[:, None]
+        lines = [*fixed[whole], *np.stack([fixed[:, :-1][parts], fixed[:, 1:][parts]], axis=1)]
         distance = float(np.median(points[..., 2][inside]))
         # Thinner than a pixel, a thread covers only a part of it. Light threads before a dark hall add light.
         coverage = min(self._parameters.net_thread * self._view.focal / distance, 1.0)
         mask = np.zeros(picture.shape[:2], np.uint8)
-        cv2.polylines(mask, list(pieces), False, round(130.0 * coverage), 1, cv2.LINE_AA, SHIFT)
-        cv2.add(picture, cv2.cvtColor(mask, cv2.COLOR_GRAY2BGR), dst=picture)
+        cv2.polylines(mask, lines, False, round(130.0 * coverage), 1, cv2.LINE_AA, SHIFT)
+        left, top, width, height = cv2.boundingRect(mask)
+        if width == 0:
+            return
+        part = slice(top, top + height), slice(left, left + width)
+        picture[part] = cv2.add(picture[part], cv2.merge([mask[part]] * 3))
 
 
 def _sensor_gain(lens: Lens, parameters: CameraParameters) -> Bytes:

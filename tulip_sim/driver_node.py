@@ -29,7 +29,7 @@ from tulip_ros import topics
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.time import stamp_of, to_message
 from tulip_sim.camera import CameraParameters, CameraRenderer
-from tulip_sim.messages import jpeg_to_message, lens_to_message, picture_to_message, truth_to_message
+from tulip_sim.messages import jpeg_to_message, lens_to_message, truth_to_message
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.referee import Referee, RefereeParameters
 from tulip_sim.referee_udp import RefereeSocket
@@ -38,6 +38,7 @@ from tulip_sim.timing import CAMERA_TICKS, SLOW_TICKS, TICK
 from tulip_sim.world import World
 from tulip_strategy.game_controller import REFEREE_PORT
 from tulip_vision.lens import head_camera_lens
+from tulip_vision.messages import picture_to_message
 
 LAG = 0.05  # [s] behind the wall clock after which the lost time is given up
 REPEAT = 0.1  # [s] of wall-clock time between repetitions of sensors that nobody answered
@@ -111,6 +112,7 @@ class DriverNode(ComponentNode):
             (topics.PUSH, self._on_push),
         ):
             self.create_service(service.type, service.name, answer)
+        self._wish: tuple[str, int] | None = None  # scenario and seed to begin anew with
         self._begin(p.scenario, p.seed)
 
     def _begin(self, scenario: str, seed: int) -> None:
@@ -146,6 +148,10 @@ class DriverNode(ComponentNode):
         Args:
             spin: Waits up to so many seconds [s] for messages and handles them.
         """
+        if self._wish is not None:
+            wish, self._wish = self._wish, None
+            self._world.close()
+            self._begin(*wish)
         sensors = self._world.sensors()
         messages = sensors_to_messages(sensors, self._cells)
         if self._tick == 0:
@@ -187,7 +193,7 @@ class DriverNode(ComponentNode):
         begin = time.monotonic()
         bound = p.answer_bound if self._started else p.start_bound
         repeat = begin + REPEAT
-        while not self._answered():
+        while not self._answered() and self._wish is None:
             now = time.monotonic()
             if now - begin > bound:
                 # From here on time follows the wall clock, as it would on the robot, until answers come again.
@@ -204,14 +210,21 @@ class DriverNode(ComponentNode):
     def _answered(self) -> bool:
         return self._answer is not None and self._asked is not None and stamp_of(self._answer) >= self._asked
 
+    def _is_from_before(self, message: JointCommandMessage) -> bool:
+        """Tell whether a command answers sensors that are still to come: it was on its way when time began anew."""
+        return stamp_of(message) > self._world.stamp
+
     def _on_legs(self, message: JointCommandMessage) -> None:
+        if self._is_from_before(message):
+            return
         self._answer = message
         if not self._waits and self._settings.mode == "sync":
             self._waits = True
             self._paced_from = (time.monotonic(), self._world.stamp)
 
     def _on_head(self, message: JointCommandMessage) -> None:
-        self._apply(message)
+        if not self._is_from_before(message):
+            self._apply(message)
 
     def _apply(self, message: JointCommandMessage) -> None:
         reason = self._world.apply(joint_command_from_message(message))
@@ -239,8 +252,7 @@ class DriverNode(ComponentNode):
         elif request.seed < 0:
             response.message = f"seed is {request.seed}; expected >= 0"
         else:
-            self._world.close()
-            self._begin(name, request.seed)
+            self._wish = (name, request.seed)  # for the next tick: the present one is under way
             response.success = True
         return response
 

@@ -13,13 +13,13 @@ from tulip_description.field import load_field
 from tulip_description.planar import Pose2D
 from tulip_msgs.msg import Decision, GroundTruth, WorldState
 from tulip_ros import topics
-from tulip_ros.errors import BadInputError
+from tulip_ros.errors import BadInputError, unknown
 from tulip_ros.launch import Launcher
-from tulip_ros.plan import make_plan
+from tulip_ros.plan import Start, make_plan, read_parameters
 from tulip_ros.run import ComponentNode, session
 from tulip_ros.time import stamp_of
 from tulip_sim.lockstep import planar_pose
-from tulip_sim.scenario import make_scenario
+from tulip_sim.scenario import SCENARIOS, make_scenario
 from tulip_sim.trial import TrialObserver, TrialSummary
 from tulip_strategy.game_controller import REFEREE_PORT
 
@@ -40,14 +40,18 @@ class TrialWatcher(ComponentNode):
     def __init__(self) -> None:
         """Connect."""
         super().__init__("trial_watcher")
-        self.observer = TrialObserver()
-        self.truth: GroundTruth | None = None
-        self.doing = ""
         self.heard = time.monotonic()
-        self.first: tuple[float, int] | None = None
+        self.begin_anew()
         self.listen(topics.GROUND_TRUTH, self._on_truth)
         self.listen(topics.WORLD_STATE, self._on_world_state)
         self.listen(topics.DECISION, self._on_decision)
+
+    def begin_anew(self) -> None:
+        """Forget the trial before."""
+        self.observer = TrialObserver()
+        self.truth: GroundTruth | None = None
+        self.doing = ""
+        self.first: tuple[float, int] | None = None
 
     def _on_truth(self, message: GroundTruth) -> None:
         self.truth, self.heard = message, time.monotonic()
@@ -73,6 +77,44 @@ class TrialWatcher(ComponentNode):
         if self.first is None or self.heard <= self.first[0]:
             return float("nan")
         return (self.stamp - self.first[1]) * 1e-9 / (self.heard - self.first[0])
+
+
+def trial_plan(
+    seed: int,
+    scenario: str = "trial",
+    record: Path | None = None,
+    parameter_files: Sequence[Path] = (),
+    values: Mapping[str, Mapping[str, Any]] | None = None,
+    referee_port: int = REFEREE_PORT,
+) -> tuple[Start, ...]:
+    """Return the nodes of a trial: simulator, robot, and recorder if wanted. Arguments as for `play_graph`.
+
+    Raises:
+        BadInputError: for an unknown scenario, or files that cannot be used.
+    """
+    if scenario not in SCENARIOS:
+        raise unknown("scenario", scenario, SCENARIOS)
+    start = make_scenario(scenario, np.random.default_rng(seed), load_field()).robot
+    given: dict[str, dict[str, Any]] = {
+        "driver": {"scenario": scenario, "seed": seed, "referee_port": referee_port, "wait_for": list(NODES)},
+        # The team tells its robot where it was put down, as people do on the real field.
+        "worldmodel": {"start_x": start.x, "start_y": start.y, "start_yaw": start.yaw},
+        "game_input": {"port": referee_port},
+        "user_input": {"autostart": True},
+    }
+    nodes = list(NODES)
+    if record is not None:
+        nodes.append("recorder")
+        given["recorder"] = {"path": str(record.absolute()), "exclude": list(UNRECORDED)}
+        given["driver"]["wait_for"] = list(nodes)
+    for path in parameter_files:
+        for name, block in read_parameters(path).items():
+            taken = sorted({str(key) for key in block} & given.get(name, {}).keys())
+            if taken:
+                raise BadInputError(f"Parameter file {path} sets {name}.{taken[0]}, which the trial itself sets.")
+    for name, own in (values or {}).items():
+        given.setdefault(name, {}).update(own)
+    return make_plan(nodes, "sim", parameter_files=parameter_files, values=given)
 
 
 def play_graph(
@@ -102,22 +144,7 @@ def play_graph(
     Raises:
         BadInputError: if a node refuses what it was given, or the simulator falls silent.
     """
-    start = make_scenario(scenario, np.random.default_rng(seed), load_field()).robot
-    given: dict[str, dict[str, Any]] = {
-        "driver": {"scenario": scenario, "seed": seed, "referee_port": referee_port, "wait_for": list(NODES)},
-        # The team tells its robot where it was put down, as people do on the real field.
-        "worldmodel": {"start_x": start.x, "start_y": start.y, "start_yaw": start.yaw},
-        "game_input": {"port": referee_port},
-        "user_input": {"autostart": True},
-    }
-    nodes = list(NODES)
-    if record is not None:
-        nodes.append("recorder")
-        given["recorder"] = {"path": str(record.absolute()), "exclude": list(UNRECORDED)}
-        given["driver"]["wait_for"] = list(nodes)
-    for name, own in (values or {}).items():
-        given.setdefault(name, {}).update(own)
-    plan = make_plan(nodes, "sim", parameter_files=parameter_files, values=given)
+    plan = trial_plan(seed, scenario, record, parameter_files, values, referee_port)
     with (
         Launcher(plan, logs) as launcher,
         session(TrialWatcher, arguments=[], handle_signals=False) as (watcher, spin),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,15 +94,27 @@ class Scene:
 
 def keeper_boxes(pose: Pose2D, team_colour: str) -> Boxes:
     """Return the boxes of a keeper figure that stands at a pose in map."""
-    parts = keeper_parts(team_colour)
+    centres, sizes, colours = _keeper_parts(team_colour)
     figure = np.eye(4)
     figure[:2, :2] = pose.rotation()
     figure[:2, 3] = pose.x, pose.y
-    transforms = np.tile(figure, (len(parts), 1, 1))
-    transforms[:, :3, 3] += np.array([part.centre for part in parts]) @ figure[:3, :3].T
-    return Boxes(
-        transforms, np.array([part.size for part in parts]), np.array([COLOURS[part.colour] for part in parts])
+    transforms = np.tile(figure, (len(sizes), 1, 1))
+    transforms[:, :3, 3] += centres @ figure[:3, :3].T
+    return Boxes(transforms, sizes, colours)
+
+
+@cache
+def _keeper_parts(team_colour: str) -> tuple[Array, Array, Array]:
+    """Return centres, sizes [m] and colours (BGR), each (n, 3), of the parts of a keeper figure."""
+    parts = keeper_parts(team_colour)
+    found = (
+        np.array([part.centre for part in parts]),
+        np.array([part.size for part in parts]),
+        np.array([COLOURS[part.colour] for part in parts]),
     )
+    for each in found:
+        each.setflags(write=False)
+    return found
 
 
 def goal_cylinders(goal: Goal) -> tuple[Cylinder, ...]:
@@ -168,7 +181,11 @@ class Body:
         self._robot = robot
         self._camera = robot.camera
         self._soles = robot.soles
-        self._columns = {joint.name: column for column, joint in enumerate(robot.moving)}
+        columns = {joint.name: column for column, joint in enumerate(robot.moving)}
+        self._columns = [columns.get(joint.name) for joint in robot.joints]
+        self._steps = np.tile(np.eye(4), (len(robot.joints), 1, 1))
+        self._steps[:, :3, 3] = [joint.origin for joint in robot.joints]
+        self._crosses = np.array([_cross_matrix(joint.axis) for joint in robot.moving])
         seen = [(link.name, box) for link in robot.links for box in link.boxes if link.name not in unseen]
         self._links = [name for name, _ in seen]
         self._centres = np.array([box.centre for _, box in seen])
@@ -182,12 +199,15 @@ class Body:
             base_in_map: (4, 4) transform of base_link in map.
             joint_positions: (n,) [rad], order of JOINTS.
         """
+        # Turns about all axes at once (Rodrigues).
+        sines, cosines = np.sin(joint_positions)[:, None, None], np.cos(joint_positions)[:, None, None]
+        turns = np.eye(3) + sines * self._crosses + (1.0 - cosines) * (self._crosses @ self._crosses)
         found = {self._robot.links[0].name: base_in_map}
-        for joint in self._robot.joints:
-            step = np.eye(4)
-            step[:3, 3] = joint.origin
-            if not joint.fixed:
-                step[:3, :3] = _turn(np.array(joint.axis), float(joint_positions[self._columns[joint.name]]))
+        for joint, still, column in zip(self._robot.joints, self._steps, self._columns, strict=True):
+            step = still
+            if column is not None:
+                step = still.copy()
+                step[:3, :3] = turns[column]
             found[joint.child] = found[joint.parent] @ step
         return found
 
@@ -210,9 +230,7 @@ class Body:
         return [(float(place[0]), float(place[1])) for place in places]
 
 
-def _turn(axis: Array, angle: float) -> Array:
-    """Return the rotation matrix about a unit axis (Rodrigues)."""
+def _cross_matrix(axis: Sequence[float]) -> Array:
+    """Return the (3, 3) matrix that takes a vector to the cross product of an axis with it."""
     x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    rotation: Array = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
-    return rotation
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -103,8 +103,9 @@ def box_faces(transforms: Array, sizes: Array, colours: Array, eye: Array) -> Fa
     eye_in_box = np.einsum("bji,bj->bi", rotations, eye - centres)
     half = sizes / 2.0
     visible = eye_in_box @ BOX_NORMALS.T > np.repeat(half, 2, axis=1)  # (B, 6)
-    distances = _depth_keys(transforms, sizes, eye, np.linalg.norm(np.maximum(np.abs(eye_in_box) - half, 0.0), axis=1))
-    corners = centres[:, None] + np.einsum("bij,bnj->bni", rotations, CORNERS[None] * sizes[:, None])
+    corners = centres[:, None] + (CORNERS * sizes[:, None]) @ rotations.transpose(0, 2, 1)
+    nearest = np.linalg.norm(np.maximum(np.abs(eye_in_box) - half, 0.0), axis=1)
+    distances = _depth_keys(transforms, half, corners, eye_in_box, nearest)
     outline = ~visible[:, BOX_NEIGHBOURS]  # (B, 6, 4)
     normals = np.einsum("bij,fj->bfi", rotations, BOX_NORMALS)
     shaded = colours[:, None] * light(normals)[..., None]
@@ -118,19 +119,18 @@ def box_faces(transforms: Array, sizes: Array, colours: Array, eye: Array) -> Fa
     )
 
 
-def _depth_keys(transforms: Array, sizes: Array, eye: Array, nearest: Array) -> Array:
+def _depth_keys(transforms: Array, half: Array, corners: Array, eye_in_box: Array, nearest: Array) -> Array:
     """Return (B,) distances that give the order of drawing: the nearest ones, corrected where one box hides another.
 
     A box cannot hide another one that lies, with the eye, on the outer side of the plane of one of its faces; nor one
     that such a plane separates from box and eye together. That puts boxes which do not overlap in order; a cycle is
     cut at its farthest box.
     """
-    count = len(sizes)
-    corners = transforms[:, None, :3, 3] + np.einsum("bij,bnj->bni", transforms[:, :3, :3], CORNERS * sizes[:, None])
+    count = len(half)
     # Of box b: corners of each other box in b's frame, and the eye.
-    relative = np.einsum("bji,banj->bani", transforms[:, :3, :3], corners[None] - transforms[:, None, None, :3, 3])
-    eye_in_box = np.einsum("bji,bj->bi", transforms[:, :3, :3], eye - transforms[:, :3, 3])[:, None]
-    half = sizes[:, None] / 2.0
+    offset = corners.reshape(1, -1, 3) - transforms[:, None, :3, 3]
+    relative = (offset @ transforms[:, :3, :3]).reshape(count, count, len(CORNERS), 3)
+    eye_in_box, half = eye_in_box[:, None], half[:, None]
     above, below = relative.min(axis=2) >= half - TOUCH, relative.max(axis=2) <= TOUCH - half  # (B, B, 3)
     behind = (above & (eye_in_box > half)) | (below & (eye_in_box < -half))
     cannot_hide = behind.any(axis=2)  # [b, a]: b cannot hide a
@@ -138,18 +138,20 @@ def _depth_keys(transforms: Array, sizes: Array, eye: Array, nearest: Array) -> 
     cannot_hide |= eye_this_side.any(axis=2).T
     waits_for = cannot_hide.T & ~cannot_hide  # [a, b]: a is drawn after b
     np.fill_diagonal(waits_for, False)
+    # Few boxes: plain numbers are faster than arrays here.
+    range_of: list[float] = nearest.tolist()
+    pending: list[int] = waits_for.sum(axis=1).tolist()
+    followers = [[box for box, waits in enumerate(column) if waits] for column in waits_for.T.tolist()]
     keys = np.empty(count)
-    left = nearest.copy()
-    pending = waits_for.sum(axis=1)
+    left = list(range(count))
     key = math.inf
-    for _ in range(count):
-        free = np.where(pending == 0, left, -math.inf)
-        chosen = int(np.argmax(free if math.isfinite(free.max()) else left))
-        key = min(key, float(nearest[chosen]))
+    while left:
+        chosen = max([box for box in left if pending[box] == 0] or left, key=range_of.__getitem__)
+        key = min(key, range_of[chosen])
         keys[chosen] = key
-        left[chosen] = -math.inf
-        pending = pending - waits_for[:, chosen]
-        pending[chosen] = -1
+        left.remove(chosen)
+        for box in followers[chosen]:
+            pending[box] -= 1
     return keys
 
 
@@ -176,8 +178,9 @@ def cylinder_faces(
     if gap <= radius * 1.001:
         return Faces(np.empty((0, 3)), np.empty(0, bool), np.empty(0, int), np.empty((0, 3)), np.empty(0))
     towards = across / gap
-    sideways = np.cross(axis, towards)
-    strips = int(np.clip(2.0 * radius * focal / max(distance, 0.05) / 3.0, 1, 8))
+    (ax, ay, az), (tx, ty, tz) = axis.tolist(), towards.tolist()
+    sideways = np.array([ay * tz - az * ty, az * tx - ax * tz, ax * ty - ay * tx])  # np.cross is slow for one pair
+    strips = int(min(max(2.0 * radius * focal / max(distance, 0.05) / 3.0, 1.0), 8.0))
     widest = math.sqrt(1.0 - (radius / gap) ** 2)  # sine of the angle at which the line of sight is a tangent
     sines = np.linspace(-widest, widest, strips + 1)
     edge = radius * (np.sqrt(1.0 - sines**2)[:, None] * towards + sines[:, None] * sideways)
@@ -185,37 +188,24 @@ def cylinder_faces(
     brightness = light(np.sqrt(1.0 - middle**2)[:, None] * towards + middle[:, None] * sideways)
     sections = len(colours)
     at = start + axis * (length * np.arange(sections + 1) / sections)[:, None]
-    points, outline, shaded = [], [], []
+    rims = at[:, None] + edge  # (sections + 1, strips + 1, 3)
+    corners = np.stack([rims[:-1, :-1], rims[:-1, 1:], rims[1:, 1:], rims[1:, :-1]], axis=2)
     top_seen, bottom_seen = along > length, along < 0.0
-    for section, colour in enumerate(colours):
-        for i in range(strips):
-            points += [
-                at[section] + edge[i],
-                at[section] + edge[i + 1],
-                at[section + 1] + edge[i + 1],
-                at[section + 1] + edge[i],
-            ]
-            outline += [
-                section == 0 and not bottom_seen,
-                i == strips - 1,
-                section == sections - 1 and not top_seen,
-                i == 0,
-            ]
-            shaded.append(np.array(colour) * brightness[i])
-    counts = [4] * (strips * sections)
-    if top_seen or bottom_seen:
-        angles = np.linspace(0.0, 2.0 * math.pi, 17)[:-1] + math.pi / 16.0
-        points += list(
-            (at[-1] if top_seen else at[0])
-            + radius * (np.cos(angles)[:, None] * towards + np.sin(angles)[:, None] * sideways)
-        )
-        outline += list(np.cos(angles + math.pi / 16.0) < 0.0)  # the far half of the rim
-        shaded.append(
-            np.array(colours[-1 if top_seen else 0]) * float(light(axis[None] if top_seen else -axis[None])[0])
-        )
-        counts.append(16)
-    faces = len(counts)
-    return Faces(np.array(points), np.array(outline), np.array(counts), np.array(shaded), np.full(faces, distance))
+    outline = np.zeros((sections, strips, 4), dtype=np.bool_)
+    outline[0, :, 0], outline[:, -1, 1], outline[-1, :, 2], outline[:, 0, 3] = not bottom_seen, True, not top_seen, True
+    shaded = np.array(colours)[:, None] * brightness[:, None]
+    counts = np.full(sections * strips, 4)
+    sides = Faces(
+        corners.reshape(-1, 3), outline.reshape(-1), counts, shaded.reshape(-1, 3), np.full(len(counts), distance)
+    )
+    if not (top_seen or bottom_seen):
+        return sides
+    angles = np.linspace(0.0, 2.0 * math.pi, 17)[:-1] + math.pi / 16.0
+    rim = radius * (np.cos(angles)[:, None] * towards + np.sin(angles)[:, None] * sideways)
+    far = np.cos(angles + math.pi / 16.0) < 0.0  # the far half of the rim
+    colour = np.array(colours[-1 if top_seen else 0]) * light(axis[None] if top_seen else -axis[None])
+    cap = Faces((at[-1] if top_seen else at[0]) + rim, far, np.array([16]), colour[None], np.array([distance]))
+    return join([sides, cap])
 
 
 class View:
@@ -278,10 +268,9 @@ class View:
 
     def _clip(self, loop: Array, outline: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
         """Cut a face at the planes of the view, one after the other (Sutherland and Hodgman, 1974)."""
-        for normal, offset in zip(self.normals, self.offsets, strict=True):
-            depth = loop @ normal - offset
-            if (depth >= 0.0).all():
-                continue
+        # What lies inside a plane as a whole stays inside, whatever the other planes cut off.
+        for plane in np.flatnonzero(self.inside(loop).min(axis=0) < 0.0).tolist():
+            depth = (loop @ self.normals[plane] - self.offsets[plane]).tolist()
             points, flags = [], []
             for i in range(len(loop)):
                 j = (i + 1) % len(loop)
@@ -292,6 +281,8 @@ class View:
                     points.append(loop[i] + (loop[j] - loop[i]) * (depth[i] / (depth[i] - depth[j])))
                     flags.append(bool(outline[i]) if depth[j] >= 0.0 else False)  # along the plane: no outline
             loop, outline = np.array(points).reshape(-1, 3), np.array(flags, dtype=bool)
+            if not len(loop):
+                break
         return loop, outline
 
     def _pixels(

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from tulip_description.field import Field
+from tulip_description.field import Field, Goal
+from tulip_description.planar import Pose2D
 from tulip_description.robot import Robot
 from tulip_sim.camera import FOOT_SHADOW, KEEPER_SHADOW, CameraParameters, CameraRenderer
 from tulip_sim.scene import Body, Scene, keeper_boxes
@@ -19,7 +20,17 @@ from tulip_vision.lens import Lens
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
-SAMPLES = 2  # per pixel, across and down: what the renderer's own anti-aliasing leaves is gone with these
+HIDDEN = ("neck",)  # stands inside the head, where drawing from far to near knows no order
+SAMPLES = 2  # per pixel, across and down: smooths what the renderer's own anti-aliasing leaves
+EXPOSURE = 1.2  # the head camera's pictures are a little dark for the page of a document
+
+VIEW_ANGLE = math.radians(60.0)
+# Where a photographer would stand for robot, ball and goal in one picture.
+DISTANCE = 2.9  # [m] from the robot: it fills two thirds of the picture's height
+ASIDE = math.radians(35.0)  # from straight behind, to the right: ball and goal are not hidden by the robot
+EYE_HEIGHT = 1.15  # [m] the robot's own
+AIM_HEIGHT = 0.72  # [m] of the point in the middle of the picture
+AIM_ASIDE = math.radians(11.0)  # the robot stands left of the middle, towards the ball's way
 
 
 class Spectator:
@@ -31,7 +42,7 @@ class Spectator:
         robot: Robot,
         width: int = 1280,
         height: int = 640,
-        view_angle: float = math.radians(60.0),
+        view_angle: float = VIEW_ANGLE,
         parameters: CameraParameters | None = None,
     ) -> None:
         """Paint ground and wall once; takes some seconds.
@@ -49,7 +60,7 @@ class Spectator:
         """
         self._parameters = parameters or CameraParameters()
         self._size = (width, height)
-        self._body = Body(robot, self._parameters.team_colour, unseen=())
+        self._body = Body(robot, self._parameters.team_colour, HIDDEN)
         lens = pinhole(SAMPLES * width, SAMPLES * height, view_angle)
         self._renderer = CameraRenderer(self._parameters, field, robot, lens)
 
@@ -70,8 +81,9 @@ class Spectator:
             boxes = boxes + keeper_boxes(truth.keeper, self._parameters.keeper_colour)
             shadows.append((truth.keeper.x, truth.keeper.y, KEEPER_SHADOW))
         scene = Scene(truth.ball_position, boxes, truth.poles, tuple(shadows))
-        picture = self._renderer.render_scene(camera_in_map, scene)
-        return np.asarray(cv2.resize(picture, self._size, interpolation=cv2.INTER_AREA), np.uint8)
+        fine = self._renderer.render_scene(camera_in_map, scene)
+        picture = cv2.resize(fine, self._size, interpolation=cv2.INTER_AREA)
+        return np.asarray(cv2.convertScaleAbs(picture, alpha=EXPOSURE), np.uint8)
 
 
 def pinhole(width: int, height: int, view_angle: float) -> Lens:
@@ -113,3 +125,16 @@ def look_at(eye: ArrayLike, target: ArrayLike) -> Array:
     pose[:3, :3] = np.column_stack([right, np.cross(forward, right), forward])
     pose[:3, 3] = place
     return pose
+
+
+def behind(robot: Pose2D, goal: Goal) -> Array:
+    """Return the (4, 4) pose in map of a camera behind the robot, to its right, with the goal in the background.
+
+    Args:
+        robot: Pose of base_footprint in map.
+        goal: What the robot attacks.
+    """
+    back = math.atan2(robot.y, robot.x - goal.x) + ASIDE  # direction from the goal's middle to the robot, and on
+    eye = np.array([robot.x + DISTANCE * math.cos(back), robot.y + DISTANCE * math.sin(back), EYE_HEIGHT])
+    ahead = back + math.pi - AIM_ASIDE
+    return look_at(eye, [eye[0] + DISTANCE * math.cos(ahead), eye[1] + DISTANCE * math.sin(ahead), AIM_HEIGHT])

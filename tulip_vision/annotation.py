@@ -74,7 +74,7 @@ def annotate(
     for refusal in refusals:
         u, v = (round(value) for value in refusal.pixel)
         cv2.drawMarker(drawn, (u, v), REFUSED, cv2.MARKER_TILTED_CROSS, 6, 1)
-        _label(drawn, (u + 5, v + 3), f"{_name(refusal.kind)}? {refusal.reason}", REFUSED, 0.3)
+        _label(drawn, (u + 5, v + 3), f"{_name(refusal.kind)}? {refusal.reason}", REFUSED, 0.35)
     for feature in sorted(features.features, key=lambda each: each.kind != FeatureClass.LINE):
         _draw(drawn, feature, view)
     return drawn
@@ -130,5 +130,7 @@ def _label(drawn: NDArray[np.uint8], place: tuple[int, int], text: str, colour: 
     (width, _), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
     x = int(np.clip(place[0], 0, max(drawn.shape[1] - width - 1, 0)))
     y = int(np.clip(place[1], 10, drawn.shape[0] - 3))
-    cv2.putText(drawn, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0), 3, cv2.LINE_AA)
+    # The dark rim is the same text moved about: since OpenCV 5, thicker letters are also wider ones.
+    for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+        cv2.putText(drawn, text, (x + dx, y + dy), cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0), 1, cv2.LINE_AA)
     cv2.putText(drawn, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, size, colour, 1, cv2.LINE_AA)

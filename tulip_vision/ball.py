@@ -8,6 +8,7 @@ linear and free of the bias of a circle fitted to pixels.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
-from tulip_vision.segmentation import Colour, Segmentation, patches
+from tulip_vision.segmentation import Colour, Segmentation, belongs, patches
 from tulip_vision.view import Array, View, angles
 
 MOST_CANDIDATES = 10
@@ -91,9 +92,10 @@ def _examine(
     if len(edge) < 5:
         return "cut by the picture's edge"
     rays = view.directions_at(edge[:, 0], edge[:, 1])
-    pixel = view.angle_per_pixel(rays.mean(axis=0) / np.linalg.norm(rays.mean(axis=0)))
-    hull = edge[cv2.convexHull(np.ascontiguousarray(edge), returnPoints=False).reshape(-1)]
-    fit = _fit_cone(view.directions_at(hull[:, 0], hull[:, 1]), rays, pixel)
+    middle = rays.sum(axis=0)
+    pixel = view.angle_per_pixel(middle / np.linalg.norm(middle))
+    hull = cv2.convexHull(np.ascontiguousarray(edge), returnPoints=False).reshape(-1)
+    fit = _fit_cone(rays[hull], rays, pixel)
     if fit is None:
         return "no round outline"
     centre, radius, residual, used = fit
@@ -118,10 +120,10 @@ def _examine(
     fill = area / _visible_disk_area(view, centre, radius, pixel)
     if fill < parameters.least_fill:
         return f"only {fill:.0%} of the disk is orange"
-    around = _cone(centre, radius + max(0.35 * radius, 2.5 * pixel), 24)
+    around = _cones(centre, [radius + max(0.35 * radius, 2.5 * pixel)], 24)
     around = around[around[:, 2] < centre[2] + 0.3 * radius]
     classes, inside = view.sample(segmentation.classes, view.pixels_of_directions(around))
-    carpet = (classes & (Colour.GREEN | Colour.WHITE)) != 0
+    carpet = belongs(classes, Colour.GREEN | Colour.WHITE)
     share = float(carpet[inside].mean()) if inside.any() else 1.0  # the picture ends at the ball: nothing to see
     if share < parameters.least_carpet:
         return f"only {share:.0%} carpet around it"
@@ -154,35 +156,41 @@ def _fit_cone(start: Array, rays: Array, pixel: float) -> tuple[Array, float, fl
     Returns:
         Direction of the axis (3,), half the opening angle [rad], mean residual [rad], number of rays used.
     """
-    kept = start
+    kept, near = start, np.empty(0, dtype=np.bool_)
     for _ in range(4):
         if len(kept) < 4:
             return None
-        solution, _, rank, _ = np.linalg.lstsq(kept, np.ones(len(kept)), rcond=None)
+        try:
+            solution = np.linalg.solve(kept.T @ kept, kept.sum(axis=0))  # least squares of kept @ solution - 1
+        except np.linalg.LinAlgError:
+            return None  # all in one plane
         length = float(np.linalg.norm(solution))
-        if rank < 3 or length <= 1.0:
+        if length <= 1.0:
             return None
         axis = np.asarray(solution / length, dtype=np.float64)
         radius = math.acos(1.0 / length)
         residuals = np.abs(np.arccos(np.clip(rays @ axis, -1.0, 1.0)) - radius)
-        kept = rays[residuals <= max(1.5 * pixel, 2.5 * float(np.median(residuals)))]
+        before, near = near, residuals <= max(1.5 * pixel, 2.5 * float(np.median(residuals)))
+        if np.array_equal(before, near):
+            break  # the next round would give the same
+        kept = rays[near]
     return axis, radius, float(np.sqrt(np.mean(np.sort(residuals)[: max(len(kept), 1)] ** 2))), len(kept)
 
 
-def _cone(axis: Array, opening: float, count: int) -> Array:
-    """Return (count, 3) unit vectors at the angle `opening` [rad] around a unit vector (3,)."""
+def _cones(axis: Array, openings: Sequence[float], count: int) -> Array:
+    """Return `count` unit vectors, one after the other, at each of some angles [rad] around a unit vector (3,)."""
     helper = np.array([0.0, 0.0, 1.0]) if abs(axis[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
     right = np.cross(axis, helper)
     right /= np.linalg.norm(right)
     up = np.cross(right, axis)
     turn = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)[:, None]
-    around: Array = math.cos(opening) * axis + math.sin(opening) * (np.cos(turn) * right + np.sin(turn) * up)
-    return around
+    ring = np.cos(turn) * right + np.sin(turn) * up
+    return np.concatenate([math.cos(opening) * axis + math.sin(opening) * ring for opening in openings])
 
 
 def _visible_disk_area(view: View, axis: Array, radius: float, pixel: float) -> float:
     """Return the area of the ball's disk that lies inside the picture [px^2]."""
-    ring = np.concatenate([_cone(axis, radius * share, 16) for share in (0.25, 0.56, 0.75, 0.9)])
-    inside = view.inside(view.pixels_of_directions(ring), margin=-0.5)
+    disk = _cones(axis, [radius * share for share in (0.25, 0.56, 0.75, 0.9)], 16)
+    inside = view.inside(view.pixels_of_directions(disk), margin=-0.5)
     share = max(float(inside.mean()), 0.05)
     return math.pi * (radius / pixel) ** 2 * share

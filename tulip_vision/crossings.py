@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
 from tulip_vision.lines import Lines
-from tulip_vision.segmentation import Colour, Segmentation, patches
+from tulip_vision.segmentation import Colour, Segmentation, belongs, patches
 from tulip_vision.view import Array, Mask, View, angles
 
 ARMS = np.array([0.13, 0.17, 0.21, 0.25, 0.29, 0.33])
@@ -136,7 +136,7 @@ def find_penalty_marks(
     carpet_level = _carpet_whiteness(segmentation)
     level = 0.5 * (carpet_level + 255.0 * min(1.0, 0.75 * segmentation.brightness))
     lowest = -view.height / math.hypot(view.height, parameters.mark_range)
-    close = np.flatnonzero(view.sines[:, view.lens.width // 2] < lowest)
+    close = np.flatnonzero(view.middle_sines < lowest)
     if not len(close):
         return Findings()
     top = int(close[0])
@@ -146,7 +146,9 @@ def find_penalty_marks(
     refusals: list[Refusal] = []
     rows, columns = mask.shape
     for points, _ in patches(mask, LEAST_MARK_AREA, MOST_MARK_CANDIDATES):
-        if len(points) < 6 or points.min() <= 0 or points[:, 0].max() >= columns - 1 or points[:, 1].max() >= rows - 1:
+        left, upper, width, height = cv2.boundingRect(points)
+        cut = min(left, upper) <= 0 or left + width >= columns or upper + height >= rows
+        if cut or len(points) < 6:
             continue
         ground = view.ground(view.directions_at(points[:, 0], points[:, 1] + top))
         centre = 0.5 * (ground.max(axis=0) + ground.min(axis=0))
@@ -160,7 +162,7 @@ def find_penalty_marks(
         classes, inside = view.sample(segmentation.classes, around)
         whiteness, _ = view.sample(segmentation.whiteness, around)
         # Far away a thin line through the spot is a blend that still counts as green: look at its brightness too.
-        plain = ((classes & Colour.GREEN) != 0) & (whiteness < carpet_level + 0.4 * (level - carpet_level))
+        plain = belongs(classes, Colour.GREEN) & (whiteness < carpet_level + 0.4 * (level - carpet_level))
         carpet = float(plain[inside].mean()) if inside.any() else 0.0
         own = abs(centre[0]) < 0.35 and abs(centre[1]) < 0.3
         if carpet < 0.95 or own or any(_distance(centre, piece.start, piece.end) < 0.15 for piece in lines.pieces):
@@ -234,7 +236,7 @@ def _shape(
     between = np.concatenate([place.point + np.array([[0.14], [0.2]]) * diagonal for diagonal in diagonals])
     images = (segmentation.whiteness, segmentation.classes)
     (carpet_values, classes), carpet_inside = view.sample_all(images, view.pixels_on_ground(between))
-    on_green = ((classes & Colour.GREEN) != 0) & carpet_inside
+    on_green = belongs(classes, Colour.GREEN) & carpet_inside
     if np.count_nonzero(on_green) < 5:
         return None, 0.0, "little carpet between the arms"
     images = (whiteness, segmentation.classes)
@@ -247,7 +249,7 @@ def _shape(
     if paint - carpet < 20.0:
         return None, 0.0, "no contrast"
     is_paint = (samples > 0.5 * (paint + carpet)) & seen
-    green = ((arm_classes & Colour.GREEN) != 0).reshape(4, len(ARMS)) & seen
+    green = belongs(arm_classes, Colour.GREEN).reshape(4, len(ARMS)) & seen
     is_carpet = ~is_paint & green | (samples < carpet + 0.35 * (paint - carpet)) & green
     has = is_paint.mean(axis=1) >= parameters.least_arm
     lacks = is_carpet.mean(axis=1) >= parameters.least_arm
@@ -278,7 +280,7 @@ def _feature(kind: FeatureClass, point: Array, confidence: float, view: View) ->
 
 
 def _carpet_whiteness(segmentation: Segmentation) -> float:
-    sampled = segmentation.whiteness[::8, ::8][(segmentation.classes[::8, ::8] & Colour.GREEN) != 0]
+    sampled = segmentation.whiteness[::8, ::8][belongs(segmentation.classes[::8, ::8], Colour.GREEN)]
     return float(np.median(sampled)) if sampled.size else 0.0
 
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
-from tulip_vision.segmentation import Colour, Segmentation
+from tulip_vision.segmentation import Colour, Segmentation, belongs
 from tulip_vision.upright import Upright, axis_samples, find_uprights, foot_on_ground
-from tulip_vision.view import Array, View, direction_of
+from tulip_vision.view import Array, View, direction_of, fan_of
 
 
 @dataclass(frozen=True)
@@ -90,10 +90,10 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
         along = axis_samples(view, segmentation.classes, foot, heights)
         if len(along) < 3:
             return "too little of it in the picture"  # the lowest segment of a pole would look the same
-        yellow = float(((along & Colour.YELLOW) != 0).mean())
+        yellow = float(belongs(along, Colour.YELLOW).mean())
         if yellow < parameters.least_yellow:
             return f"only {yellow:.0%} of the axis is yellow"
-        if float(((along & Colour.BLUE) != 0).mean()) > 0.12:
+        if float(belongs(along, Colour.BLUE).mean()) > 0.12:
             return "blue above it: a pole"
         bar = _crossbar(segmentation, view, foot, parameters)
         direction = direction_of(upright.azimuth, elevation)
@@ -120,9 +120,9 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
 def _blue_above(upright: Upright, segmentation: Segmentation, view: View) -> bool:
     """Return whether the patch ends below something blue."""
     elevations = upright.high + upright.pixel_angle * np.arange(1.0, 8.0)
-    directions = np.stack([direction_of(upright.azimuth, elevation) for elevation in elevations])
-    classes, _ = view.sample(segmentation.classes, view.pixels_of_directions(directions))
-    return int(np.count_nonzero(classes & Colour.BLUE)) >= 2
+    above = view.pixels_of_directions(fan_of(upright.azimuth, elevations))
+    classes, _ = view.sample(segmentation.classes, above)
+    return int(np.count_nonzero(belongs(classes, Colour.BLUE))) >= 2
 
 
 def _crossbar(segmentation: Segmentation, view: View, foot: Array, parameters: GoalParameters) -> float:
@@ -139,7 +139,7 @@ def _crossbar(segmentation: Segmentation, view: View, foot: Array, parameters: G
     places = foot + ways[:, None, :] * reach[:, None]
     points = np.concatenate([places, np.full((*places.shape[:2], 1), parameters.height)], axis=2)
     values, inside = view.sample(segmentation.classes, view.pixels(points.reshape(-1, 3)))
-    yellow = ((values & Colour.YELLOW) != 0).reshape(len(ways), len(reach))
+    yellow = belongs(values, Colour.YELLOW).reshape(len(ways), len(reach))
     seen = inside.reshape(yellow.shape).sum(axis=1)
     return float(np.where(seen >= 3, yellow.sum(axis=1) / np.maximum(seen, 1), 0.0).max())
 

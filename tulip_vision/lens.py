@@ -113,12 +113,11 @@ class Lens:
             outside the picture that the distortion folds back on itself.
         """
         directions = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        x, y, z = directions.T
+        visible = (z > 1e-9) & (x * x + y * y <= (z * self._largest_tangent) ** 2)
+        if visible.all():
+            return self._distort(directions)
         pixels = np.full((len(directions), 2), np.nan)
-        z = directions[:, 2]
-        visible = z > 1e-9
-        visible[visible] = (
-            np.hypot(directions[visible, 0], directions[visible, 1]) <= z[visible] * self._largest_tangent
-        )
         if visible.any():
             pixels[visible] = self._distort(directions[visible])
         return pixels
@@ -143,6 +142,20 @@ class Lens:
         unit: Array = directions / np.linalg.norm(directions, axis=1, keepdims=True)
         return unit
 
+    def rays_inside(self, pixels: Array) -> Array:
+        """Return the same as `rays` for (n, 2) pixels inside the picture, read from the table: much faster.
+
+        Between the table's pixels rays are interpolated, which errs by less than a thousandth of a pixel.
+        """
+        table = self._ray_table
+        low = np.minimum(pixels.astype(np.intp), (self.width - 2, self.height - 2))
+        (u, v), (right, down) = low.T, (pixels - low).T[:, :, None]
+        upper = table[v, u] * (1.0 - right) + table[v, u + 1] * right
+        lower = table[v + 1, u] * (1.0 - right) + table[v + 1, u + 1] * right
+        rays = upper * (1.0 - down) + lower * down
+        unit: Array = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        return unit
+
     def ray_table(self) -> NDArray[np.float32]:
         """Return the direction seen at each pixel, computed once.
 
@@ -150,6 +163,15 @@ class Lens:
             (height, width, 3) unit vectors in camera_optical_frame, read-only.
         """
         return self._ray_table
+
+    def angle_per_pixel(self, cosine: float) -> float:
+        """Return how much one pixel sees, across the way to the picture's middle [rad].
+
+        Args:
+            cosine: Of the angle between the pixel's direction and the optical axis.
+        """
+        cosines, seen = self._angles_per_pixel
+        return float(np.interp(cosine, cosines, seen))
 
     def horizon(self, rotation: ArrayLike, count: int = 33) -> Array:
         """Return the points of the horizon that lie in the picture, from left to right.
@@ -192,6 +214,19 @@ class Lens:
         return table
 
     @cached_property
+    def _angles_per_pixel(self) -> tuple[Array, Array]:
+        """Cosines of angles to the optical axis, rising, and what a pixel sees there, the mean all round it [rad]."""
+        angles = np.linspace(math.atan(self._largest_tangent), 0.005, 256)[1:, None]
+        turn = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
+        step = 1e-3  # [rad] small enough to be linear, large enough for the projection's rounding
+        before, after = (
+            np.stack([np.sin(angles) * np.cos(way), np.sin(angles) * np.sin(way), np.cos(angles) + 0.0 * way], axis=-1)
+            for way in (turn - step / 2.0, turn + step / 2.0)
+        )
+        moved = np.linalg.norm(self.project(after) - self.project(before), axis=1).reshape(len(angles), len(turn))
+        return np.cos(angles[:, 0]), step * np.sin(angles[:, 0]) / moved.mean(axis=1)
+
+    @cached_property
     def _largest_tangent(self) -> float:
         """Tangent of the angle to the optical axis up to which the distortion grows monotonically."""
         angles = np.linspace(0.0, math.radians(88.0), 881)
@@ -199,21 +234,35 @@ class Lens:
             coefficients = np.array([1.0, *self.distortion])
             radii = sum(k * angles ** (2 * power + 1) for power, k in enumerate(coefficients))
         else:
-            squared = np.tan(angles) ** 2
-            k = np.zeros(8)
-            k[: self.distortion.size] = self.distortion
-            numerator = 1.0 + squared * (k[0] + squared * (k[1] + squared * k[4]))
-            denominator = 1.0 + squared * (k[5] + squared * (k[6] + squared * k[7]))
-            radii = np.tan(angles) * numerator / denominator
+            radii = np.tan(angles) * self._radial(np.tan(angles) ** 2)
         falling = np.flatnonzero(np.diff(radii) <= 0.0)
         return math.tan(angles[falling[0] if falling.size else -1])
 
     def _distort(self, directions: Array) -> Array:
-        points = np.ascontiguousarray(directions).reshape(-1, 1, 3)
-        still = np.zeros(3)
-        model = cv2.fisheye.projectPoints if self.model == FISHEYE else cv2.projectPoints
-        pixels, _ = model(points, still, still, self.camera_matrix, self.distortion)
-        return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        """Return (n, 2) pixels of (n, 3) points that are in front of the camera."""
+        if self.model == FISHEYE:
+            points, still = np.ascontiguousarray(directions).reshape(-1, 1, 3), np.zeros(3)
+            seen, _ = cv2.fisheye.projectPoints(points, still, still, self.camera_matrix, self.distortion)
+            return np.asarray(seen, dtype=np.float64).reshape(-1, 2)
+        # cv2.projectPoints gives the same, but works out all derivatives too, in ten times the time.
+        x, y = directions[:, 0] / directions[:, 2], directions[:, 1] / directions[:, 2]
+        xx, yy, xy = x * x, y * y, 2.0 * x * y
+        squared = xx + yy
+        radial = self._radial(squared)
+        (fx, _, cx), (_, fy, cy), _ = self.camera_matrix.tolist()
+        p1, p2 = self.distortion.tolist()[2:4]
+        pixels = np.empty((len(directions), 2))
+        pixels[:, 0] = fx * (x * radial + p1 * xy + p2 * (squared + 2.0 * xx)) + cx
+        pixels[:, 1] = fy * (y * radial + p1 * (squared + 2.0 * yy) + p2 * xy) + cy
+        return pixels
+
+    def _radial(self, squared: Array) -> Array:
+        """Return (n,) by how much plumb_bob stretches the distance from the optical axis, given its square at z = 1."""
+        k = [*self.distortion.tolist(), 0.0, 0.0, 0.0, 0.0][:8]
+        stretch: Array = 1.0 + squared * (k[0] + squared * (k[1] + squared * k[4]))
+        if any(k[5:]):
+            stretch = stretch / (1.0 + squared * (k[5] + squared * (k[6] + squared * k[7])))
+        return stretch
 
 
 HEAD_CAMERA_FOCAL_LENGTH = 455.0

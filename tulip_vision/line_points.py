@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -114,23 +115,19 @@ def find_line_points(segmentation: Segmentation, view: View, parameters: LinePoi
         higher = cv2.max(sides[np.maximum(place - reach, 0)], sides[np.minimum(place + reach, len(side) - 1)])
         own = segmentation.whiteness[low:high, columns]
         white = cv2.subtract(own, higher) > contrast[low:high, None]
-        cut, where = _runs(np.ascontiguousarray(white.T), own.T, reach[None, :].repeat(white.shape[1], axis=0))
+        cut, where = _runs(white.T, own.T, np.broadcast_to(reach, white.T.shape))
         found.append(np.column_stack([step // 2 + step * cut, where + low]))
     steps = np.where(slant[first:last] < parameters.near, parameters.row_step, parameters.row_step // 4)
     chosen = first + np.flatnonzero((np.arange(first, last) % steps) == 0)
-    reach = np.minimum(np.rint(across_column[chosen]), LONGEST_REACH).astype(np.intp)[:, None]
-    place = np.arange(view.lens.width)
-    begin = (chosen * view.lens.width)[:, None]
-    before = side.ravel()[np.maximum(place - reach, 0) + begin]
-    after = side.ravel()[np.minimum(place + reach, view.lens.width - 1) + begin]
+    reach = np.minimum(np.rint(across_column[chosen]), LONGEST_REACH).astype(np.intp)
     own = segmentation.whiteness[chosen]
-    white = cv2.subtract(own, cv2.max(before, after)) > contrast[chosen, None]
-    cut, where = _runs(white, own, np.broadcast_to(reach, white.shape))
+    white = cv2.subtract(own, _higher_side(side[chosen], reach)) > contrast[chosen, None]
+    cut, where = _runs(white, own, np.broadcast_to(reach[:, None], white.shape))
     found.append(np.column_stack([where, chosen[cut]]))
     pixels = np.concatenate(found)
     nearest = np.rint(pixels).astype(np.intp)
     pixels = pixels[segmentation.on_carpet[nearest[:, 1], nearest[:, 0]] != 0]
-    rays = view.lens.rays(pixels)
+    rays = view.lens.rays_inside(pixels)
     ground = view.ground(rays @ view.rotation.T)
     with np.errstate(invalid="ignore"):
         far = np.hypot(*(ground - view.position[:2]).T) < parameters.farthest
@@ -148,7 +145,7 @@ def _expected_widths(view: View, parameters: LinePointParameters) -> tuple[Array
         Thickness, with a margin, of a line across and of one along the line of sight [px], and the slant range
         [m], infinite above the horizon.
     """
-    sines = view.sines[:, view.lens.width // 2].astype(np.float64)
+    sines = view.middle_sines
     with np.errstate(divide="ignore"):
         slant = np.where(sines < -1e-3, view.height / -sines, np.inf)
     focal = float(view.lens.camera_matrix[1, 1])
@@ -166,6 +163,23 @@ def _contrast(slant: Array, brightness: float, view: View, parameters: LinePoint
     return np.clip(asked * brightness, 9.0, 90.0).astype(np.uint8)
 
 
+def _higher_side(rows: NDArray[np.uint8], reach: NDArray[np.intp]) -> NDArray[np.uint8]:
+    """Return for each pixel of (n, width) rows the higher of the two that are `reach` (n,) to its left and right.
+
+    Beyond the ends of a row its last pixels count. Rows of the same reach must follow each other.
+    """
+    width = rows.shape[1]
+    most = int(reach.max())
+    wider = cv2.copyMakeBorder(rows, 0, 0, most, most, cv2.BORDER_REPLICATE)
+    higher = np.empty_like(rows)
+    borders = [0, *(np.flatnonzero(np.diff(reach)) + 1).tolist(), len(reach)]
+    for first, last in pairwise(borders):
+        left, right = most - int(reach[first]), most + int(reach[first])
+        part = wider[first:last]
+        np.maximum(part[:, left : left + width], part[:, right : right + width], out=higher[first:last])
+    return higher
+
+
 def _runs(
     white: NDArray[np.bool_], whiteness: NDArray[np.uint8], reach: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], Array]:
@@ -180,10 +194,11 @@ def _runs(
         (n,) index of the cut, and (n,) place of the run's middle within it [px].
     """
     cuts, length = white.shape
-    padded = np.zeros((cuts, length + 2), dtype=np.int8)
+    padded = np.zeros((cuts, length + 2), dtype=np.bool_)
     padded[:, 1:-1] = white
-    change = np.diff(padded, axis=1).ravel()
-    start, end = np.flatnonzero(change > 0), np.flatnonzero(change < 0)  # in a row of length + 1
+    # Each row begins and ends without white, so that beginnings and ends of runs take turns.
+    change = np.flatnonzero(padded[:, 1:] != padded[:, :-1])  # in a row of length + 1
+    start, end = change[0::2], change[1::2]
     cut = start // (length + 1)
     start, end = start % (length + 1), end % (length + 1)
     expected = reach[cut, (start + end) // 2]

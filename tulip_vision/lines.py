@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -162,14 +163,13 @@ def _local_directions(points: LinePoints, radius: float) -> tuple[Array, NDArray
     """Return each point's (n, 2) unit direction from its neighbours, and (n,) whether they lie on a line."""
     flat = points.flat
     count = len(flat)
-    pairs = cKDTree(flat).query_pairs(radius, output_type="ndarray")
+    one, other = cKDTree(flat, balanced_tree=False).query_pairs(radius, output_type="ndarray").T
+    x, y = flat[:, 0][other] - flat[:, 0][one], flat[:, 1][other] - flat[:, 1][one]
     # Far away the cuts are closer together, and so are the lines.
-    both_near = points.near[pairs[:, 0]] & points.near[pairs[:, 1]]
-    apart = ((flat[pairs[:, 1]] - flat[pairs[:, 0]]) ** 2).sum(axis=1)
-    pairs = pairs[both_near | (apart < (FAR_NEIGHBOURHOOD * radius) ** 2)]
-    first = np.concatenate([pairs[:, 0], pairs[:, 1]])
-    offset = flat[pairs[:, 1]] - flat[pairs[:, 0]]
-    x, y = np.concatenate([offset[:, 0], -offset[:, 0]]), np.concatenate([offset[:, 1], -offset[:, 1]])
+    kept = (points.near[one] & points.near[other]) | (x * x + y * y < (FAR_NEIGHBOURHOOD * radius) ** 2)
+    one, other, x, y = one[kept], other[kept], x[kept], y[kept]
+    first = np.concatenate([one, other])
+    x, y = np.concatenate([x, -x]), np.concatenate([y, -y])
     number = np.bincount(first, minlength=count) + 1.0
     mean_x, mean_y = (np.bincount(first, each, count) / number for each in (x, y))
     xx = np.bincount(first, x * x, count) / number - mean_x**2
@@ -205,9 +205,7 @@ def _find_circle(
     if shape.prod() > 100_000:
         return None, none
     counts = np.bincount(index[:, 0] * shape[1] + index[:, 1], minlength=int(shape.prod())).reshape(shape)
-    padded = np.pad(counts, 1)
-    rows, columns = counts.shape
-    summed = np.sum([padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3)], axis=0)
+    summed = cv2.boxFilter(counts.astype(np.float32), -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
     peak = np.unravel_index(int(np.argmax(summed)), summed.shape)
     centre = votes.min(axis=0) + (np.array(peak) + 0.5) * cell
     tolerance = _circle_tolerance(ground, view, parameters)
@@ -221,8 +219,11 @@ def _find_circle(
         if np.count_nonzero(used) < parameters.circle_points:
             return None, none
         # Gauss-Newton: the residual falls by radial . step when the centre moves by step.
-        step, *_ = np.linalg.lstsq(radial[used], error[used], rcond=None)
-        centre = centre + step
+        away = radial[used]
+        try:
+            centre = centre + np.linalg.solve(away.T @ away, away.T @ error[used])
+        except np.linalg.LinAlgError:
+            return None, none  # all points in one direction
     if not _is_whole(centre, offset[used], view, parameters):
         return None, none
     on_circle = none.copy()
@@ -302,9 +303,9 @@ def _find_pieces(
 
 def _fit(points: Array) -> tuple[Array, Array]:
     """Return the centre (2,) and unit direction (2,) of the line with the least squared distances to points."""
-    centre = points.mean(axis=0)
+    centre = points.sum(axis=0) / len(points)
     offset = points - centre
-    xx, yy, xy = (offset[:, 0] ** 2).sum(), (offset[:, 1] ** 2).sum(), (offset[:, 0] * offset[:, 1]).sum()
+    (xx, xy), (_, yy) = (offset.T @ offset).tolist()
     angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
     return centre, np.array([math.cos(angle), math.sin(angle)])
 
@@ -320,25 +321,37 @@ def _longest_run(points: Array, view: View, parameters: LineParameters) -> NDArr
     place = (points - centre) @ along
     order = np.argsort(place)
     place = place[order]
-    ground = _to_ground(centre + place[:, None] * along, view)
-    metres = np.linalg.norm(np.diff(ground, axis=0), axis=1)
-    gaps = ~(metres <= parameters.largest_gap) & (np.diff(place) > parameters.largest_gap_pixels)
-    parts = np.split(order, np.flatnonzero(gaps) + 1)
+    gaps = np.flatnonzero(np.diff(place) > parameters.largest_gap_pixels)
+    if not len(gaps):
+        return order
+    before, after = (_to_ground(centre + place[ends, None] * along, view) for ends in (gaps, gaps + 1))
+    metres = np.linalg.norm(after - before, axis=1)
+    parts = np.split(order, gaps[~(metres <= parameters.largest_gap)] + 1)
     return max(parts, key=len)
 
 
 def _bent(place: Array, across: Array, residual: float) -> bool:
     """Return whether points follow an arc rather than a line: a parabola fits them much better.
 
+    The line is the best one for the points, so that the sums of `place`, `across` and their product are zero.
+    Then only the parabola's part that no line has needs to be fitted.
+
     Args:
         place: (n,) along the line [px].
         across: (n,) beside the line [px].
         residual: Root mean square of `across` [px].
     """
-    curve = np.polynomial.polynomial.polyfit(place, across, 2)
-    rest = across - np.polynomial.polynomial.polyval(place, curve)
-    sagitta = abs(float(curve[2])) * (0.5 * float(np.ptp(place))) ** 2
-    return sagitta > 1.0 and float(np.sqrt(np.mean(rest**2))) < 0.6 * residual
+    squared = place * place
+    total = float(squared.sum())
+    if total == 0.0:
+        return False  # all points in one place
+    bow = squared - total / len(place) - float(squared @ place) / total * place  # a parabola across all lines
+    bows, fits = float(bow @ bow), float(bow @ across)
+    if bows < 1e-9 * total:
+        return False  # fewer than three places
+    sagitta = abs(fits) / bows * (0.5 * float(np.ptp(place))) ** 2
+    rest = max(residual**2 - fits**2 / bows / len(place), 0.0)
+    return sagitta > 1.0 and math.sqrt(rest) < 0.6 * residual
 
 
 def _piece(points: Array, view: View) -> LinePiece | None:
@@ -346,7 +359,7 @@ def _piece(points: Array, view: View) -> LinePiece | None:
     offset = points - centre
     place = offset @ along
     across = offset @ np.array([-along[1], along[0]])
-    residual = float(np.sqrt(np.mean(across**2)))
+    residual = math.sqrt(float(across @ across) / len(across))
     if _bent(place, across, residual):
         return None
     ends = _to_ground(np.stack([centre + place.min() * along, centre + place.max() * along]), view)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
-from tulip_vision.segmentation import Colour, Segmentation, patches
-from tulip_vision.view import Array, View, angles, direction_of
+from tulip_vision.segmentation import Colour, Segmentation, belongs, patches
+from tulip_vision.view import View, angles, direction_of, fan_of
 
 MARKERS = {"cyan": (Colour.CYAN, Colour.MAGENTA), "magenta": (Colour.MAGENTA, Colour.CYAN)}
 """Own marker colour and the opponents', by the own team's colour."""
@@ -220,12 +220,6 @@ def _joined(marker: _Marker, markers: list[_Marker], reach: float) -> _Marker:
     )
 
 
-def _fan(azimuths: Array, elevations: Array) -> Array:
-    """Return (len(elevations) * len(azimuths), 3) directions, row by row from the first elevation."""
-    el, az = np.meshgrid(elevations, azimuths, indexing="ij")
-    return np.stack([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)], axis=-1).reshape(-1, 3)
-
-
 def _contact(marker: _Marker, half: float, segmentation: Segmentation, view: View, pixel: float) -> float | None:
     """Return the elevation at which the body's lowest point meets the carpet [rad].
 
@@ -244,11 +238,11 @@ def _contact(marker: _Marker, half: float, segmentation: Segmentation, view: Vie
     elevations = np.arange(0.5 * (marker.low + marker.high), bottom, -step)[:240]
     if len(elevations) < 4:
         return None  # the marker touches the lower edge of the picture
-    pixels = view.pixels_of_directions(_fan(azimuths, elevations))
+    pixels = view.pixels_of_directions(fan_of(azimuths, elevations))
     (classes, on_carpet), inside = view.sample_all((segmentation.classes, segmentation.on_carpet), pixels)
     shape = (len(elevations), len(azimuths))
     # A ball at the feet is no part of the body.
-    carpet = (((classes & (CARPET | Colour.ORANGE)) != 0) & (on_carpet != 0)).reshape(shape)
+    carpet = (belongs(classes, CARPET | Colour.ORANGE) & (on_carpet != 0)).reshape(shape)
     seen = inside.reshape(shape)
     # The carpet begins where three samples in a row are carpet; a single one is noise.
     begins = carpet[:-2] & carpet[1:-1] & carpet[2:]
@@ -256,7 +250,7 @@ def _contact(marker: _Marker, half: float, segmentation: Segmentation, view: Vie
     first = begins.argmax(axis=0)
     starts_on_body = ~carpet[0] & seen[0]
     # A body hides carpet: above its foot the picture shows something else inside the carpet's outline.
-    painted = (classes & (Colour.YELLOW | Colour.BLUE)) != 0
+    painted = belongs(classes, Colour.YELLOW | Colour.BLUE)
     hides = ~carpet & (on_carpet != 0).reshape(shape) & ~painted.reshape(shape)
     hidden = np.array([np.count_nonzero(hides[: first[column], column]) for column in range(len(azimuths))])
     standing = has & starts_on_body & (hidden >= 2)
@@ -273,8 +267,8 @@ def _painted(marker: _Marker, low: float, segmentation: Segmentation, view: View
     """Return the share of yellow and blue between the marker's middle and the foot."""
     elevations = np.linspace(low, 0.5 * (marker.low + marker.high), 24)
     azimuths = np.linspace(marker.right, marker.left, 5)
-    classes, inside = view.sample(segmentation.classes, view.pixels_of_directions(_fan(azimuths, elevations)))
-    return float(((classes & (Colour.YELLOW | Colour.BLUE)) != 0)[inside].mean()) if inside.any() else 0.0
+    classes, inside = view.sample(segmentation.classes, view.pixels_of_directions(fan_of(azimuths, elevations)))
+    return float(belongs(classes, Colour.YELLOW | Colour.BLUE)[inside].mean()) if inside.any() else 0.0
 
 
 def _middle(
@@ -284,11 +278,11 @@ def _middle(
     half = 1.3 * parameters.half_width / distance
     azimuths = np.linspace(marker.azimuth - half, marker.azimuth + half, 41)
     elevations = np.linspace(low + 0.02 / distance, min(marker.high, low + 0.9 / distance), 12)
-    pixels = view.pixels_of_directions(_fan(azimuths, elevations))
+    pixels = view.pixels_of_directions(fan_of(azimuths, elevations))
     (classes, on_carpet), inside = view.sample_all((segmentation.classes, segmentation.on_carpet), pixels)
     shape = (len(elevations), len(azimuths))
     other = Colour.ORANGE | Colour.YELLOW | Colour.BLUE
-    body = (((classes & (CARPET | other)) == 0) & inside & (on_carpet != 0)).reshape(shape)
+    body = (~belongs(classes, CARPET | other) & inside & (on_carpet != 0)).reshape(shape)
     complete = (inside & (on_carpet != 0)).reshape(shape).all(axis=1)
     rows = complete & body.any(axis=1) & (body.mean(axis=1) < 0.8)
     if np.count_nonzero(rows) < 2:

@@ -10,9 +10,9 @@ import numpy as np
 
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
-from tulip_vision.segmentation import Colour, Segmentation
+from tulip_vision.segmentation import Colour, Segmentation, belongs
 from tulip_vision.upright import Upright, axis_samples, find_uprights, foot_on_ground
-from tulip_vision.view import View, direction_of
+from tulip_vision.view import Mask, View, direction_of
 
 PATTERNS = {
     FeatureClass.POLE_YELLOW_BLUE_YELLOW: (Colour.YELLOW, Colour.BLUE, Colour.YELLOW),
@@ -63,17 +63,14 @@ def find_poles(segmentation: Segmentation, view: View, parameters: PoleParameter
     if width == 0:
         return Findings()
     # Yellow segments lie at most one blue one above or below; with some slack for the view from above.
-    part = slice(max(top - 2 * height, 0), top + 3 * height), slice(max(left - width, 0), left + 2 * width)
-    mask = np.zeros_like(blue)
+    corner = max(left - width, 0), max(top - 2 * height, 0)
+    part = slice(corner[1], top + 3 * height), slice(corner[0], left + 2 * width)
+    either = belongs(segmentation.classes[part], Colour.YELLOW | Colour.BLUE).view(np.uint8)
     # Where yellow meets blue the blend is neither: close gaps of up to four pixels, upwards only.
-    mask[part] = cv2.morphologyEx(
-        np.minimum(segmentation.classes[part] & np.uint8(Colour.YELLOW | Colour.BLUE), 1) * np.uint8(255),
-        cv2.MORPH_CLOSE,
-        np.ones((5, 1), dtype=np.uint8),
-    )
+    mask: Mask = cv2.morphologyEx(either, cv2.MORPH_CLOSE, np.ones((5, 1), dtype=np.uint8))
     poles: list[Feature] = []
     refusals: list[Refusal] = []
-    for upright in find_uprights(mask, segmentation, view, parameters.least_area):
+    for upright in find_uprights(mask, segmentation, view, parameters.least_area, corner):
         result = _examine(upright, segmentation, view, parameters)
         if isinstance(result, Feature):
             poles.append(result)
@@ -109,7 +106,7 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
         if match > best:
             best, kind = match, candidate
     if best < parameters.least_match:
-        blue = axis_samples(view, segmentation.classes, foot, heights) & Colour.BLUE
+        blue = belongs(axis_samples(view, segmentation.classes, foot, heights), Colour.BLUE)
         return f"only {best:.0%} of the pattern fits" if blue.any() else ""
     fitting = parameters.diameter / distance
     slack = 2.5 * upright.pixel_angle * math.hypot(1.0, view.height / distance)

@@ -143,8 +143,15 @@ class Segmentation:
 
     def mask(self, colours: Colour) -> Mask:
         """Return (height, width) nonzero where a pixel belongs to one of the classes."""
-        found: Mask = np.bitwise_and(self.classes, np.uint8(int(colours)))
+        found: Mask = np.bitwise_and(self.classes, np.uint8(colours))
         return found
+
+
+def belongs(classes: Mask, colours: Colour) -> NDArray[np.bool_]:
+    """Return where an array of any shape, with bits of `Colour`, belongs to one of the classes."""
+    # Without the conversion numpy takes an enumeration's member for a wide integer, and computes with those.
+    found: NDArray[np.bool_] = np.bitwise_and(classes, np.uint8(colours)) != 0
+    return found
 
 
 class Segmenter:
@@ -168,7 +175,7 @@ class Segmenter:
         brightness = self._brightness(picture)
         packed = cv2.cvtColor(picture, cv2.COLOR_BGR2BGR555)  # two bytes a pixel, little-endian: 0rrrrrgg gggbbbbb
         index = packed.view(np.uint16).reshape(picture.shape[:2])
-        classes: Mask = np.take(self.table(brightness), index)
+        classes: Mask = np.take(self.table(brightness), index, mode="wrap")  # every index is inside: saves the check
         whiteness: Mask = cv2.min(cv2.extractChannel(picture, 0), cv2.extractChannel(picture, 2))
         outline = self._outline(classes, view)
         on_carpet: Mask = np.zeros(classes.shape, dtype=np.uint8)
@@ -176,7 +183,8 @@ class Segmenter:
             corners = [[outline[-1, 0], classes.shape[0]], [outline[0, 0], classes.shape[0]]]
             polygon = np.rint(np.concatenate([outline, corners])).astype(np.int32)
             cv2.fillPoly(on_carpet, [polygon], 255)
-        share = float(np.count_nonzero(classes[::8, ::8] & Colour.GREEN)) / max(classes[::8, ::8].size, 1)
+        sampled = belongs(classes[::8, ::8], Colour.GREEN)
+        share = float(np.count_nonzero(sampled)) / max(sampled.size, 1)
         return Segmentation(classes, whiteness, on_carpet, outline, brightness, share)
 
     def _make_table(self, brightness: float) -> NDArray[np.uint8]:
@@ -210,13 +218,15 @@ class Segmenter:
 
     def _brightness(self, picture: Picture) -> float:
         """Return the carpet's value over the reference, from every eighth pixel; 1 if there is hardly any green."""
-        hsv = cv2.cvtColor(np.ascontiguousarray(picture[::8, ::8]), cv2.COLOR_BGR2HSV).reshape(-1, 3)
+        hsv = cv2.cvtColor(picture[::8, ::8], cv2.COLOR_BGR2HSV)
         box = self._parameters.colours.green
-        hue = hsv[:, 0].astype(np.float64) * 2.0  # OpenCV keeps hue / 2 in a byte
-        green = (hue >= box.hue[0]) & (hue <= box.hue[1]) & (hsv[:, 1] >= 255 * box.saturation[0]) & (hsv[:, 2] >= 20)
-        if np.count_nonzero(green) < 0.02 * len(hsv):
+        # OpenCV keeps hue / 2 in a byte.
+        low = (math.ceil(box.hue[0] / 2.0), math.ceil(255.0 * box.saturation[0]), 20)
+        green = cv2.inRange(hsv, low, (math.floor(box.hue[1] / 2.0), 255, 255))
+        values = hsv[..., 2][green != 0]
+        if len(values) < 0.02 * green.size:
             return 1.0
-        return float(np.median(hsv[green, 2])) / 255.0 / self._parameters.reference_brightness
+        return float(np.median(values)) / 255.0 / self._parameters.reference_brightness
 
     def _outline(self, classes: Mask, view: View) -> Array:
         """Return the carpet's upper edge: the hull of the tops of each column's lowest run of carpet.
@@ -228,17 +238,15 @@ class Segmenter:
         parameters = self._parameters
         step = parameters.outline_step
         coarse = classes[step // 2 :: step, step // 2 :: step]
-        rows, columns = coarse.shape
-        green = (coarse & (Colour.GREEN | Colour.ORANGE)) != 0
-        u_grid, v_grid = np.meshgrid(np.arange(columns) * step + step // 2, np.arange(rows) * step + step // 2)
-        rays = view.lens.ray_table()[v_grid, u_grid].astype(np.float64)
-        down = rays @ view.rotation[2]
+        rows = len(coarse)
+        rays = view.lens.ray_table()
         lowest = view.height / math.hypot(view.height, parameters.farthest)  # sine of the angle below the horizon
-        below = down < -lowest
+        some = rays[step // 2 :: step, step // 2 :: step].reshape(-1, 3)
+        below = (some @ view.rotation[2].astype(np.float32) < -lowest).reshape(coarse.shape)
         # Thick lines divide runs, so white is part of them; but a grey floor counts as white now and then, and so
         # white joins no parts, and the carpet's edge itself is green.
-        carpet = _large_parts(green & below)
-        filled = carpet | (((coarse & Colour.WHITE) != 0) & below)
+        carpet = _large_parts(belongs(coarse, Colour.GREEN | Colour.ORANGE) & below)
+        filled = carpet | (belongs(coarse, Colour.WHITE) & below)
         row = _top_of_lowest_run(filled, parameters.outline_run, parameters.outline_gap)
         carpet &= np.arange(rows)[:, None] >= row
         row = np.where(carpet.any(axis=0), carpet.argmax(axis=0), rows)
@@ -247,14 +255,14 @@ class Segmenter:
             return np.empty((0, 2))
         row = row[column]
         # The edge lies in the step above the first green sample: find it pixel by pixel.
-        u = u_grid[0, column]
-        v = v_grid[row, column]
+        u = column * step + step // 2
+        v = row * step + step // 2
         offsets = np.arange(step)
         above = np.maximum(v[:, None] - offsets, 0)
-        still = np.logical_and.accumulate((classes[above, u[:, None]] & Colour.GREEN) != 0, axis=1)
+        still = np.logical_and.accumulate(belongs(classes[above, u[:, None]], Colour.GREEN), axis=1)
         v = np.maximum(v - np.maximum(still.sum(axis=1) - 1, 0), 0)
 
-        flat = _level_plane(view, view.lens.ray_table()[v, u].astype(np.float64))
+        flat = _level_plane(view, rays[v, u].astype(np.float64))
         hull = _upper_hull(flat)
         if len(hull) < 2:
             return np.empty((0, 2))
@@ -263,18 +271,21 @@ class Segmenter:
         return _picture_edge(_from_level_plane(view, np.stack([across, height], axis=1)), view, 3.0 * step)
 
 
-def patches(mask: Mask, least_area: float, most: int) -> list[tuple[NDArray[np.int32], float]]:
+def patches(
+    mask: Mask, least_area: float, most: int, corner: tuple[int, int] = (0, 0)
+) -> list[tuple[NDArray[np.int32], float]]:
     """Return the connected patches of a mask, largest first, those inside the holes of others too.
 
     Args:
         mask: (height, width) nonzero inside the patches.
         least_area: Smaller ones are left out [px^2].
         most: Largest number of patches.
+        corner: u, v in the picture of the mask's first pixel, where the mask is of a part of the picture.
 
     Returns:
         For each patch its outer contour, (n, 2) u and v [px], and its area without regard to holes [px^2].
     """
-    contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE, offset=corner)
     if hierarchy is None:
         return []
     shortest = 4.0 * (math.sqrt(least_area) - 1.0)  # of a contour round that area: a square's
@@ -299,7 +310,7 @@ def _large_parts(filled: NDArray[np.bool_]) -> NDArray[np.bool_]:
     count, labels, numbers, _ = cv2.connectedComponentsWithStats(filled.astype(np.uint8), connectivity=8)
     if count < 2:
         return filled
-    areas = numbers[:, cv2.CC_STAT_AREA].copy()
+    areas = numbers[:, cv2.CC_STAT_AREA]
     areas[0] = 0
     large: NDArray[np.bool_] = (areas >= 0.2 * areas.max())[labels]
     return large
@@ -346,16 +357,16 @@ def _from_level_plane(view: View, points: Array) -> Array:
 
 def _upper_hull(points: Array) -> NDArray[np.intp]:
     """Return the indices of the upper convex hull of (n, 2) points, left to right (Andrew's monotone chain)."""
-    order = np.lexsort((points[:, 1], points[:, 0]))
+    places: list[list[float]] = points.tolist()  # plain numbers: numpy is slow one by one
     chain: list[int] = []
-    for index in order:
+    for index in np.lexsort((points[:, 1], points[:, 0])).tolist():
+        x, y = places[index]
         while len(chain) >= 2:
-            first, second = points[chain[-2]], points[chain[-1]]
-            edge, new = second - first, points[index] - first
-            if edge[0] * new[1] - edge[1] * new[0] < 0.0:
+            (x0, y0), (x1, y1) = places[chain[-2]], places[chain[-1]]
+            if (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) < 0.0:
                 break
             chain.pop()
-        chain.append(int(index))
+        chain.append(index)
     return np.array(chain, dtype=np.intp)
 
 

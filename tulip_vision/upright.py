@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tulip_vision.segmentation import Colour, Segmentation, patches
-from tulip_vision.view import Array, Mask, View, angles, direction_of
+from tulip_vision.segmentation import Colour, Segmentation, belongs, patches
+from tulip_vision.view import Array, Mask, View, angles, direction_of, fan_of
 
 MOST_CANDIDATES = 12
 """The largest patches are looked at; a crowd in yellow shirts must not cost time without bound."""
@@ -49,19 +50,27 @@ class Upright:
         return view.height / math.tan(-self.low) if self.low < -1e-3 else math.inf
 
 
-def find_uprights(mask: Mask, segmentation: Segmentation, view: View, least_area: float) -> list[Upright]:
+def find_uprights(
+    mask: Mask, segmentation: Segmentation, view: View, least_area: float, corner: tuple[int, int] = (0, 0)
+) -> list[Upright]:
     """Return the patches of a mask that lie below the horizon, each with its middle, edges and foot.
 
     Args:
-        mask: (height, width) nonzero where the thing's colours are.
+        mask: (rows, columns) of the picture or of a part of it, nonzero where the thing's colours are.
         segmentation: Of the same picture.
         view: Of the same picture.
         least_area: Smaller patches are noise [px^2].
+        corner: u, v in the picture of the mask's first pixel.
     """
-    below = np.bitwise_and(mask, view.below_horizon)
+    left, top, width, height = cv2.boundingRect(mask)
+    if width == 0:
+        return []
+    u, v = corner[0] + left, corner[1] + top
+    horizon = view.below_horizon[v : v + height, u : u + width]
+    below = np.bitwise_and(mask[top : top + height, left : left + width], horizon)
     found = []
-    for points, _ in patches(below, least_area, MOST_CANDIDATES):
-        width, height = np.ptp(points, axis=0) + 1
+    for points, _ in patches(below, least_area, MOST_CANDIDATES, (u, v)):
+        _, _, width, height = cv2.boundingRect(points)
         if height > LEAST_SLENDERNESS * width:
             found.append(_measure(points, segmentation, view))
     return found
@@ -111,20 +120,21 @@ def _measure(points: NDArray[np.int32], segmentation: Segmentation, view: View) 
     pixel = view.angle_per_pixel(direction_of(float(azimuths[lowest]), low))
     # The lower two thirds: whatever hangs onto the upper end (a crossbar close by, a net) does not move the middle.
     lower = turned[elevations <= low + max(0.66 * (high - low), 2.0 * pixel)]
-    left, right = np.percentile(lower, [94.0, 6.0])
-    middle = reference + 0.5 * float(left + right)
+    lower.sort()
+    # The 94th and the 6th percentile, as `np.percentile` has them.
+    left, right = np.interp([0.94 * (len(lower) - 1), 0.06 * (len(lower) - 1)], np.arange(len(lower)), lower).tolist()
+    middle = reference + 0.5 * (left + right)
     rows, columns = segmentation.classes.shape
-    near_middle = np.abs(turned - (middle - reference)) <= 0.35 * float(left - right) + pixel
+    near_middle = np.abs(turned - (middle - reference)) <= 0.35 * (left - right) + pixel
     foot = float(elevations[near_middle].min()) - 0.5 * pixel if near_middle.any() else low
-    under = np.array([foot - step * pixel for step in (2.0, 3.0, 4.0, 5.0)])
-    directions = np.stack([direction_of(middle, elevation) for elevation in under])
-    below = view.pixels_of_directions(directions)
+    under = [foot - step * pixel for step in (2.0, 3.0, 4.0, 5.0)]
+    below = view.pixels_of_directions(fan_of(middle, under))
     (classes, carpet), inside = view.sample_all((segmentation.classes, segmentation.on_carpet), below)
-    ground = ((classes & (Colour.GREEN | Colour.WHITE)) != 0) & (carpet != 0) & inside
+    ground = belongs(classes, Colour.GREEN | Colour.WHITE) & (carpet != 0) & inside
     top, bottom = points[highest], points[lowest]
     return Upright(
         azimuth=(middle + math.pi) % (2.0 * math.pi) - math.pi,
-        width=float(left - right) + pixel,
+        width=left - right + pixel,
         low=foot,
         high=high,
         foot_seen=int(ground.sum()) >= 3,

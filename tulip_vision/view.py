@@ -12,12 +12,17 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tulip_vision.lens import Lens
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
+
+HORIZON_STEP = 64
+"""[px] between the pixels of a row that tell on which side of the horizon it lies."""
+HORIZON_MARGIN = 0.015
+"""Sine of the elevation: more than it may differ from an even change between those pixels, in any usual lens."""
 
 
 @dataclass(frozen=True)
@@ -80,22 +85,32 @@ class View:
         self.spread = spread
 
     @cached_property
-    def sines(self) -> NDArray[np.float32]:
-        """(height, width) sine of the elevation seen at each pixel; negative below the horizon."""
-        table = self.lens.ray_table()
-        seen: NDArray[np.float32] = table.reshape(-1, 3) @ self.rotation[2].astype(np.float32)
-        return seen.reshape(table.shape[:2])
+    def middle_sines(self) -> Array:
+        """(height,) sine of the elevation seen in the picture's middle column; negative below the horizon."""
+        seen: Array = self.lens.ray_table()[:, self.lens.width // 2].astype(np.float64) @ self.rotation[2]
+        return seen
 
     @cached_property
     def below_horizon(self) -> Mask:
         """(height, width) 255 where a pixel looks below the horizon, else 0."""
-        below: Mask = cv2.compare(self.sines, 0.0, cv2.CMP_LT)
+        rays, up = self.lens.ray_table(), self.rotation[2].astype(np.float32)
+        # Most rows lie on one side of the horizon as a whole, as some of their pixels tell: only the rest is work.
+        columns = [*range(0, self.lens.width - 1, HORIZON_STEP), self.lens.width - 1]
+        some = (rays[:, columns].reshape(-1, 3) @ up).reshape(-1, len(columns))
+        highest, lowest = some.max(axis=1), some.min(axis=1)
+        below: Mask = np.zeros(rays.shape[:2], dtype=np.uint8)
+        below[highest < -HORIZON_MARGIN] = 255
+        mixed = np.flatnonzero((highest >= -HORIZON_MARGIN) & (lowest <= HORIZON_MARGIN))
+        if len(mixed):
+            rows = slice(int(mixed[0]), int(mixed[-1]) + 1)
+            below[rows] = np.where(cv2.transform(rays[rows], up[None]) < 0.0, np.uint8(255), np.uint8(0))
         return below
 
     @cached_property
     def lowest_elevation(self) -> float:
         """Lowest elevation that the lower edge of the picture shows [rad]."""
-        return math.asin(float(np.clip(self.sines[-1].min(), -1.0, 1.0)))
+        lowest = float((self.lens.ray_table()[-1].astype(np.float64) @ self.rotation[2]).min())
+        return math.asin(max(min(lowest, 1.0), -1.0))
 
     @property
     def height(self) -> float:
@@ -103,8 +118,8 @@ class View:
         return float(self.position[2])
 
     def directions(self, pixels: Array) -> Array:
-        """Return (n, 3) unit vectors in base_footprint that are seen at (n, 2) pixels."""
-        seen: Array = self.lens.rays(pixels) @ self.rotation.T
+        """Return (n, 3) unit vectors in base_footprint that are seen at (n, 2) pixels inside the picture."""
+        seen: Array = self.lens.rays_inside(pixels) @ self.rotation.T
         return seen
 
     def directions_at(self, u: NDArray[np.integer[Any]], v: NDArray[np.integer[Any]]) -> Array:
@@ -142,15 +157,7 @@ class View:
 
     def angle_per_pixel(self, direction: Array) -> float:
         """Return how much one pixel sees around a direction (3,) in base_footprint [rad]."""
-        x, y, z = (float(value) for value in direction)
-        a, b, c = (float(value) for value in self.rotation[:, 2])
-        side = np.array([y * c - z * b, z * a - x * c, x * b - y * a])  # np.cross is slow for single vectors
-        norm = math.sqrt(float(side @ side))
-        side = self.rotation[:, 0] if norm < 1e-6 else side / norm
-        step = 1e-3  # [rad] small enough to be linear, large enough for the projection's rounding
-        ends = self.pixels_of_directions(np.stack([direction, direction + step * side]))
-        moved = math.hypot(*(ends[1] - ends[0]))
-        return step / moved if moved > 0.0 else 1.0 / float(self.lens.camera_matrix[0, 0])
+        return self.lens.angle_per_pixel(float(self.rotation[:, 2] @ direction))
 
     def spreads(self, direction: Array, pixels: float = 1.0) -> tuple[float, float]:
         """Return the standard deviations of azimuth and elevation of a direction [rad].
@@ -200,10 +207,8 @@ class View:
     def coverage(self) -> Array:
         """Return (4,) azimuth of left and right edge, elevation of lower and upper edge, at the middle [rad]."""
         right, bottom = self.lens.width - 1.0, self.lens.height - 1.0
-        edges = self.directions(
-            np.array([[0.0, bottom / 2], [right, bottom / 2], [right / 2, bottom], [right / 2, 0.0]])
-        )
-        azimuths, elevations = angles(edges)
+        edges = np.array([[0.0, bottom / 2], [right, bottom / 2], [right / 2, bottom], [right / 2, 0.0]])
+        azimuths, elevations = angles(self.directions(edges))
         return np.array([azimuths[0], azimuths[1], elevations[2], elevations[3]])
 
 
@@ -216,3 +221,22 @@ def direction_of(azimuth: float, elevation: float) -> Array:
     """Return the (3,) unit vector with these angles [rad]."""
     level = math.cos(elevation)
     return np.array([level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)])
+
+
+def fan_of(azimuths: ArrayLike, elevations: ArrayLike) -> Array:
+    """Return unit vectors with all pairs of these angles [rad].
+
+    Args:
+        azimuths: (m,).
+        elevations: (n,).
+
+    Returns:
+        (n * m, 3), row by row from the first elevation.
+    """
+    azimuth, elevation = np.atleast_1d(azimuths), np.atleast_1d(elevations)[:, None]
+    level = np.cos(elevation)
+    fan = np.empty((elevation.shape[0], azimuth.shape[0], 3))
+    fan[..., 0] = level * np.cos(azimuth)
+    fan[..., 1] = level * np.sin(azimuth)
+    fan[..., 2] = np.sin(elevation)
+    return fan.reshape(-1, 3)

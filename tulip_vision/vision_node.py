@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from functools import partial
 
 import cv2
 from nav_msgs.msg import Odometry
@@ -19,6 +20,8 @@ from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParamete
 
 WAITING = 3  # pictures that wait for their pose: 0.2 s at 15 Hz; then something is wrong with the poses
 
+JOINT_STATES_WAITING = 50  # 0.2 s at 250 Hz: none may be lost while a picture is processed
+
 
 class VisionNode(ComponentNode):
     """Turns messages into calls of vision and its answers into messages.
@@ -31,18 +34,22 @@ class VisionNode(ComponentNode):
         super().__init__("vision")
         cv2.setNumThreads(1)  # the robot's other nodes need the other cores
         self._settings = self.load(VisionParameters())
-        robot = load_robot()
-        self._poses = PoseBuffer(
-            PoseBufferParameters(), lambda height, turn, pan, tilt: camera_in_footprint(robot, height, turn, pan, tilt)
-        )
+        self._robot = load_robot()
         self._vision: Vision | None = None
-        self._pictures: deque[Image] = deque()
+        self.begin_anew()
         self._features = self.sender(topics.FEATURES)
         self._drawn = self.sender(topics.VISION_PICTURE)
         self.listen(topics.CAMERA_INFO, self._on_lens)
         self.listen(topics.ODOMETRY, self._on_odometry)
-        self.listen(topics.JOINT_STATES, self._on_joints)
+        self.listen(topics.JOINT_STATES, self._on_joints, depth=JOINT_STATES_WAITING)
         self.listen(topics.CAMERA_IMAGE, self._on_picture)
+
+    def begin_anew(self) -> None:
+        """Forget poses, waiting pictures and what was seen; the lens stays."""
+        self._poses = PoseBuffer(PoseBufferParameters(), partial(camera_in_footprint, self._robot))
+        self._pictures: deque[Image] = deque()
+        if self._vision is not None:
+            self._vision = Vision(self._settings, self._vision.lens)
 
     def _on_lens(self, message: CameraInfo) -> None:
         try:

@@ -24,8 +24,6 @@ from tulip_worldmodel.rejected import Rejected
 from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
 from tulip_worldmodel.world_state import WorldState
 
-NEW_GAME = 1_000_000_000  # [ns] a stamp that lies further back than this belongs to a simulation begun anew
-
 
 @dataclass(frozen=True)
 class WorldModelNodeParameters(WorldModelParameters):
@@ -45,30 +43,25 @@ class WorldModelNode(ComponentNode):
         """Make the core and connect it."""
         super().__init__("worldmodel")
         self._settings = self.load(WorldModelNodeParameters())
-        self._last_odometry: int | None = None  # stamp [ns]
-        self._last_published: int | None = None  # stamp [ns]
-        self._world = self._new_world()
+        self.begin_anew()
         self._world_state = self.sender(topics.WORLD_STATE)
         self._robot_pose = self.sender(topics.ROBOT_POSE)
         self._transforms = self.sender(topics.TF)
         self.listen(topics.ODOMETRY, self._on_odometry)
         self.listen(topics.FEATURES, self._on_features)
 
-    def _new_world(self) -> WorldModel:
+    def begin_anew(self) -> None:
+        """Make the core, which starts at the start pose."""
         p = self._settings
         try:
             field = load_field(p.field_file or None)
         except FieldError as error:
             raise BadInputError(f"Parameter field_file of node 'worldmodel': {error}") from error
-        return WorldModel(p, field, Pose2D(p.start_x, p.start_y, p.start_yaw))
+        self._world = WorldModel(p, field, Pose2D(p.start_x, p.start_y, p.start_yaw))
+        self._last_published: int | None = None  # stamp [ns]
 
     def _on_odometry(self, message: OdometryMessage) -> None:
-        last = self._last_odometry
         stamp = stamp_of(message)
-        if last is not None and stamp < last - NEW_GAME:
-            self.get_logger().info("time went back: the world model begins anew at its start pose")
-            self._world, self._last_published = self._new_world(), None
-        self._last_odometry = stamp
         self._world.add_odometry(odometry_from_message(message))
         published = self._last_published
         if published is None or stamp - published >= self._settings.publish_period * 1e9:

@@ -31,12 +31,6 @@ def test_waiting_instants_stay_few():
     assert same.dropped == 100 - KEEP
 
 
-def test_time_may_begin_anew():
-    same = SameStamp("a")
-    assert same.add("a", 60_000_000_000, "late") == ("late",)
-    assert same.add("a", 0, "new") == ("new",)
-
-
 def test_unknown_name_is_refused():
     with pytest.raises(ValueError, match="expected one of a, b"):
         SameStamp("a", "b").add("c", 0, None)

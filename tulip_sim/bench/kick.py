@@ -43,7 +43,8 @@ def summarize(rows: list[Row]) -> list[str]:
     good = sum(row["upright"] and row["ball speed [m/s]"] >= WANTED for row in rows)
     directions = np.array([row["direction [deg]"] for row in rows])
     return [
-        f"From standing, ball at the place where strategy lines up, +-{1000 * PLACE_ERROR:.0f} mm; randomised as for walking.",
+        f"From standing, ball at the place where strategy lines up, +-{1000 * PLACE_ERROR:.0f} mm;"
+        " randomised as for walking.",
         "",
         "| kicks | upright and ball at 2 m/s or more | ball speed: least, median | direction: RMS | tilt, greatest |",
         "| --- | --- | --- | --- | --- |",

@@ -30,24 +30,28 @@ def summarize(rows: list[Row]) -> list[str]:
     """Return the totals and one line a trial."""
     goals = [row for row in rows if row["outcome"] == "goal"]
     time = f"{np.median([row['time [s]'] for row in goals]):.0f} s" if goals else "none"
+    place, heading, factor = (
+        float(np.median([row[name] for row in rows]))
+        for name in ("localization error [m]", "heading error [deg]", "real-time factor")
+    )
     lines = [
-        "Robot in its own half, heading random within 45 deg of the goal, ball 0.5-3 m away in any direction, keeper off-centre;"
-        " 150 s of play. Camera, vision, localization, strategy and referee run as in the graph.",
+        "Robot in its own half, heading random within 45 deg of the goal, ball 0.5-3 m away in any direction, keeper"
+        " off-centre; 150 s of play. Camera, vision, localization, strategy and referee run as in the graph.",
         "",
         f"- goals: {len(goals)} of {len(rows)}; median time to goal {time}",
         f"- falls: {sum(row['falls'] for row in rows)}",
-        f"- localization error, median of the trials' RMS: {np.median([row['localization error [m]'] for row in rows]):.2f} m,"
-        f" {np.median([row['heading error [deg]'] for row in rows]):.1f} deg",
-        f"- real-time factor with one trial on each of two cores, median: {np.median([row['real-time factor'] for row in rows]):.1f}",
+        f"- localization error, median of the trials' RMS: {place:.3f} m, {heading:.1f} deg",
+        f"- real-time factor of one trial with one more on the other core, median: {factor:.1f}",
         "",
         "| seed | outcome | time | touches | falls | walked | localization error |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
-    lines += [
-        f"| {row['seed']} | {row['outcome']} | {row['time [s]']} s | {row['touches']} | {row['falls']}"
-        f" | {row['distance walked [m]']} m | {row['localization error [m]']:.2f} m, {row['heading error [deg]']:.1f} deg |"
-        for row in rows
-    ]
+    for row in rows:
+        error = f"{row['localization error [m]']:.3f} m, {row['heading error [deg]']:.1f} deg"
+        lines.append(
+            f"| {row['seed']} | {row['outcome']} | {row['time [s]']} s | {row['touches']} | {row['falls']}"
+            f" | {row['distance walked [m]']} m | {error} |"
+        )
     return lines
 
 

@@ -36,8 +36,8 @@ def measure(speed: float, seed: int) -> Row:
 def summarize(rows: list[Row]) -> list[str]:
     """Return a table, one line a speed."""
     lines = [
-        f"Straight ahead for {DURATION:.0f} s without camera; friction 0.6-1.0, link masses +-5 %, joint friction, sensor"
-        " noise and delay are random, and one tick of delay between sensors and torques.",
+        f"Straight ahead for {DURATION:.0f} s without camera. Friction 0.6-1.0, link masses +-5 %, joint friction,"
+        " sensor noise and delay are random; torques act one tick after their sensors.",
         "",
         "| commanded | upright | distance, median | sideways, most | tilt, most | torque by its limit, most |",
         "| --- | --- | --- | --- | --- | --- |",

@@ -1,0 +1,117 @@
+"""Make the pictures of the documents from a trial: the robot with ball and goal, and what its camera sees."""
+
+from __future__ import annotations
+
+import _environment
+
+if __name__ == "__main__":
+    _environment.prepare()
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import cv2
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from tulip_description.camera_pose import camera_in_footprint
+from tulip_description.field import load_field
+from tulip_description.robot import load_robot
+from tulip_motion.interface import MotionMode, Support
+from tulip_sim.camera import CameraParameters, CameraRenderer
+from tulip_sim.lockstep import Lockstep, robot_pose
+from tulip_sim.scenario import make_scenario
+from tulip_sim.spectator import Spectator, behind
+from tulip_sim.truth import Truth
+from tulip_vision.features import FeatureClass
+from tulip_vision.lens import head_camera_lens
+from tulip_vision.pipeline import Vision, VisionParameters
+
+PICTURES = Path(__file__).resolve().parent.parent / "docs" / "pictures"
+BALL_AHEAD = (0.5, 1.2)  # [m] near enough for one picture, too far to be hidden by the feet
+BALL_ASIDE = 0.2  # [m]
+MID_STEP = (0.3, 0.7)  # of a step: the swing foot is off the ground
+WANTED = {FeatureClass.BALL, FeatureClass.GOAL_POST, FeatureClass.OPPONENT}  # in the head camera's picture
+SECOND = 10**9  # [ns]
+PERIOD = 20_000_000  # [ns] between two looks
+LONGEST = 160  # [s] of simulated time
+TRIALS = 20
+
+Picture = NDArray[np.uint8]
+
+
+class HeadCamera:
+    """The head camera and what vision finds in its picture."""
+
+    def __init__(self) -> None:
+        lens = head_camera_lens()
+        self._robot = load_robot()
+        self._renderer = CameraRenderer(CameraParameters(), load_field(), self._robot, lens)
+        self._vision = Vision(VisionParameters(), lens)
+
+    def look(self, truth: Truth) -> tuple[set[FeatureClass], Picture]:
+        """Return what vision finds, and the picture with the features drawn in."""
+        picture = self._renderer.render(truth, np.random.default_rng(truth.stamp))
+        pan, tilt = truth.joint_positions[12:]
+        pose = camera_in_footprint(self._robot, truth.base_position[2], truth.base_orientation, pan, tilt)
+        features = self._vision.process(picture, truth.stamp, pose)
+        return {feature.kind for feature in features.features}, self._vision.annotate(picture, features)
+
+
+def worth_a_picture(trial: Lockstep, truth: Truth) -> bool:
+    """Return whether the robot walks behind the ball in the half of the goal that it attacks."""
+    legs, pose = trial.motion.state(), robot_pose(truth)
+    ahead, aside = (truth.ball_position[:2] - [pose.x, pose.y]) @ pose.rotation()
+    return (
+        legs.mode is MotionMode.WALK
+        and legs.support is not Support.DOUBLE
+        and MID_STEP[0] < legs.phase < MID_STEP[1]
+        and pose.x > 0.0
+        and BALL_AHEAD[0] < ahead < BALL_AHEAD[1]
+        and abs(aside) < BALL_ASIDE
+    )
+
+
+def find_moment(seed: int, camera: HeadCamera) -> tuple[Truth, Picture] | None:
+    """Play a trial until robot, ball and goal make a picture; return what is, and what the head camera sees."""
+    trial = Lockstep(make_scenario("trial", np.random.default_rng(seed), load_field()), seed)
+    try:
+        while trial.referee.outcome is None and trial.stamp < LONGEST * SECOND:
+            trial.step()
+            truth = trial.world.truth()
+            if trial.stamp % PERIOD == 0 and worth_a_picture(trial, truth):
+                kinds, seen = camera.look(truth)
+                if kinds >= WANTED:
+                    return truth, seen
+        return None
+    finally:
+        trial.close()
+
+
+def main(
+    seed: Annotated[int, typer.Option(help="Of the first trial to look at; the next ones follow.", min=0)] = 2,
+    folder: Annotated[Path, typer.Option(help="Where match.png and camera.png go.")] = PICTURES,
+) -> None:
+    """Play trials in lockstep until robot, ball, goal and keeper make a picture."""
+    camera = HeadCamera()
+    for number in range(seed, seed + TRIALS):
+        found = find_moment(number, camera)
+        if found is not None:
+            break
+        print(f"seed {number}: ball, goal and keeper were never in sight together")
+    else:
+        print("error: no trial had a moment for a picture; try another --seed.", file=sys.stderr)
+        raise typer.Exit(1)
+    truth, seen = found
+    field = load_field()
+    view = Spectator(field, load_robot()).render(truth, behind(robot_pose(truth), field.opponent_goal))
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, picture in (("match.png", view), ("camera.png", seen)):
+        cv2.imwrite(str(folder / name), picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+        print(f"wrote {folder / name}: seed {number}, {truth.stamp / SECOND:.2f} s")
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,101 @@
+"""The whole robot as a graph of processes: nodes that die, and a simulation begun anew."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from graph_trial import SECOND, Trial, free_port, running_trial
+from rosbags.highlevel import AnyReader
+
+from tulip_msgs.msg import MotionState
+from tulip_ros import topics
+from tulip_sim.match_graph import UNRECORDED, play_graph
+from tulip_sim.referee_udp import RefereeSocket
+from tulip_strategy.interface import GamePhase
+
+pytestmark = [pytest.mark.ros, pytest.mark.sim, pytest.mark.slow, pytest.mark.usefixtures("ros_domain")]
+
+START = (-2.0, 0.0)  # [m] where the robot stands in the scenario "open"
+
+
+def test_vision_dies_while_the_robot_walks_and_the_game_goes_on(tmp_path: Path) -> None:
+    with running_trial(tmp_path / "logs") as trial:
+        watcher = trial.watcher
+        trial.until(lambda: watcher.walks, 20.0)
+        seen = watcher.pictures
+        assert seen > 0
+        trial.kill("vision")
+        trial.until(lambda: trial.restarts("vision") == 1, 10.0)
+        trial.until(lambda: watcher.pictures > seen + 10, 30.0)
+        again = watcher.stamp
+        trial.until(lambda: watcher.stamp > again + 2 * SECOND, 3.0)
+        trial.until(lambda: watcher.motion.mode in (MotionState.WALK, MotionState.KICK), 20.0)
+        assert not watcher.fell
+        assert not watcher.truth.robot_fallen
+        assert "vision was killed by SIGKILL" in trial.events[0]
+        others = [state.restarts for state in trial.launcher.states() if state.name != "vision"]
+        assert others == [0] * 7
+
+
+def walks_to_the_ball(trial: Trial) -> None:
+    watcher = trial.watcher
+    trial.until(lambda: watcher.walks and watcher.truth.robot.position.x > START[0] + 0.3, 20.0)
+    assert not watcher.fell
+
+
+def test_simulation_begun_anew_twice_while_the_robot_walks(tmp_path: Path) -> None:
+    with running_trial(tmp_path / "logs") as trial:
+        watcher = trial.watcher
+        walks_to_the_ball(trial)
+        for _ in range(2):
+            trial.begin_anew("open", 1)
+            trial.until(lambda: watcher.motion.mode == MotionState.STAND and watcher.stamp > SECOND // 2, 2.0)
+            x, y = watcher.truth.robot.position.x, watcher.truth.robot.position.y
+            assert (x, y) == pytest.approx(START, abs=0.1)
+            walks_to_the_ball(trial)
+        assert trial.events == []  # nobody had to be restarted
+
+
+def test_wrong_packets_during_a_game_change_nothing_and_are_named(tmp_path: Path) -> None:
+    with running_trial(tmp_path / "logs") as trial, RefereeSocket(port=trial.port) as stranger:
+        watcher = trial.watcher
+        trial.until(lambda: any(game.phase == GamePhase.PLAYING for game in watcher.games), 10.0)
+        begin = len(watcher.games)
+        wrong = {
+            b"RGme": "is 4 bytes long",
+            b"RGme\x0c" + bytes(683): "version is 12",
+            bytes(range(256)) * 8: "packet begins with",
+        }
+        for data, words in wrong.items():
+            stranger.send(data)
+            trial.until(lambda words=words: any(words in each for each in watcher.warnings["game_input"]), 10.0)
+        now = watcher.stamp
+        trial.until(lambda: watcher.games[-1].header.stamp.sec * SECOND > now and len(watcher.games) > begin + 2, 5.0)
+        assert {game.phase for game in watcher.games[begin:]} == {GamePhase.PLAYING}
+        assert not any(game.stale for game in watcher.games)
+        assert watcher.motion.mode == MotionState.WALK
+        assert trial.events == []
+
+
+def test_whole_recording_of_a_trial_is_read_by_another_reader(tmp_path: Path) -> None:
+    rules = {"initial_time": 0.5, "ready_time": 0.5, "set_time": 0.5, "playing_time": 1.0}
+    summary = play_graph(
+        1, "open", tmp_path / "trial", values={"driver": {"rules": rules}}, referee_port=free_port(), logs=tmp_path
+    )
+    assert summary.outcome == "time"
+    kept = [topic for topic in topics.TOPICS if f"/(.*/)?{topic.name}" not in UNRECORDED]
+    assert len(kept) == len(topics.TOPICS) - len(UNRECORDED)
+    counts: dict[str, int] = {}
+    with AnyReader([tmp_path / "trial"]) as reader:
+        kinds = {each.topic: each.msgtype for each in reader.connections}
+        for connection, _, raw in reader.messages():
+            message = reader.deserialize(raw, connection.msgtype)
+            assert message.__msgtype__ == connection.msgtype
+            counts[connection.topic] = counts.get(connection.topic, 0) + 1
+    kinds.pop("/rosout", None)  # there if a node logged something
+    assert kinds == {f"/{topic.name.lstrip('/')}": topic.type_name for topic in kept}
+    assert set(counts) - {"/rosout"} == set(kinds)
+    assert counts["/joint_states"] > 500  # 2.5 s at 250 Hz
+    assert counts["/camera/image_raw/compressed"] > 30
+    assert Path(summary.recording).parent == tmp_path / "trial"

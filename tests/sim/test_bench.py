@@ -1,0 +1,133 @@
+"""Benches: they run, keep their rows, and say what came out."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tulip_sim.bench import kick, trial, walk
+from tulip_sim.bench.runner import Bench, Row, run, save, write_results
+
+BENCHES = (trial.BENCH, walk.BENCH, kick.BENCH)
+
+TRIAL_ROWS: list[Row] = [
+    {
+        "seed": seed,
+        "outcome": outcome,
+        "time [s]": duration,
+        "touches": 5,
+        "falls": falls,
+        "distance walked [m]": 3.0,
+        "localization error [m]": error,
+        "heading error [deg]": 2.0,
+        "real-time factor": 1.5,
+    }
+    for seed, outcome, duration, falls, error in (
+        (1, "goal", 20.0, 0, 0.1),
+        (2, "fallen", 60.0, 2, 0.3),
+        (3, "goal", 40.0, 1, 0.2),
+    )
+]
+WALK_ROWS: list[Row] = [
+    {
+        "speed commanded [m/s]": speed,
+        "seed": seed,
+        "friction": 0.8,
+        "upright": upright,
+        "distance [m]": distance,
+        "sideways [m]": sideways,
+        "greatest tilt [rad]": 0.1 * seed,
+        "greatest torque by limit": 0.8,
+    }
+    for speed, seed, upright, distance, sideways in (
+        (0.6, 1, False, 3.0, 0.1),
+        (0.4, 1, True, 23.0, 0.5),
+        (0.4, 2, True, 24.0, -1.5),
+    )
+]
+KICK_ROWS: list[Row] = [
+    {
+        "foot": "left",
+        "seed": 0,
+        "refusal": "",
+        "upright": upright,
+        "ball speed [m/s]": speed,
+        "direction [deg]": direction,
+        "greatest tilt [rad]": 0.1,
+    }
+    for upright, speed, direction in ((True, 2.5, 3.0), (False, 2.5, -4.0), (True, 1.9, 0.0))
+]
+
+
+def test_trials_are_counted_and_listed() -> None:
+    text = "\n".join(trial.summarize(TRIAL_ROWS))
+    assert "goals: 2 of 3; median time to goal 30 s" in text
+    assert "falls: 3" in text
+    assert "median of the trials' RMS: 0.20 m, 2.0 deg" in text
+    assert "| 2 | fallen | 60.0 s | 5 | 2 | 3.0 m | 0.30 m, 2.0 deg |" in text
+
+
+def test_trials_without_a_goal_have_no_time_to_goal() -> None:
+    assert "goals: 0 of 1; median time to goal none" in "\n".join(trial.summarize(TRIAL_ROWS[1:2]))
+
+
+def test_walks_are_summarized_by_speed() -> None:
+    lines = walk.summarize(WALK_ROWS)
+    assert lines[-2:] == [
+        "| 0.4 m/s | 2 of 2 | 23.5 m of 24 m | 1.5 m | 0.20 rad | 0.80 |",
+        "| 0.6 m/s | 0 of 1 | 3.0 m of 36 m | 0.1 m | 0.10 rad | 0.80 |",
+    ]
+
+
+def test_good_kicks_are_fast_and_leave_the_robot_upright() -> None:
+    assert "| 3, both feet | 1 of 3 | 1.9, 2.5 m/s | 2.9 deg | 0.10 rad |" in kick.summarize(KICK_ROWS)
+
+
+def _late(index: int) -> Row:
+    time.sleep(0.3 if index == 0 else 0.0)
+    return {"index": index}
+
+
+def test_rows_keep_the_order_of_the_trials_whichever_ends_first() -> None:
+    came: list[Row] = []
+    bench = Bench("late", "Late", [(index,) for index in range(4)], _late, lambda rows: [])
+    rows = run(bench, workers=2, done=came.append)
+    assert [row["index"] for row in rows] == [0, 1, 2, 3]
+    assert sorted(row["index"] for row in came) == [0, 1, 2, 3]
+    assert came[0]["index"] != 0
+
+
+@pytest.mark.sim
+def test_a_kick_is_measured_kept_and_published(tmp_path: Path) -> None:
+    bench = replace(kick.BENCH, trials=kick.BENCH.trials[:1])
+    rows = run(bench, workers=1)
+    assert [(row["foot"], row["seed"], row["refusal"]) for row in rows] == [("left", 0, "")]
+    kept = save(bench, rows, tmp_path / "results")
+    assert kept == tmp_path / "results" / "kick.json"
+    assert json.loads(kept.read_text()) == {"bench": "kick", "rows": rows}
+    page = tmp_path / "results.md"
+    write_results(BENCHES, tmp_path / "results", page)
+    text = page.read_text()
+    assert "## Kicking (`kick`)" in text
+    assert "| 1, both feet | 1 of 1 |" in text
+    assert "## Walking" not in text  # nothing is known of it
+
+
+@pytest.mark.sim
+def test_a_walk_that_is_cut_short_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(walk, "DURATION", 4.0)
+    row = walk.measure(0.4, 1)
+    assert row["upright"]
+    assert 0.6 < row["distance [m]"] < 1.6  # it starts from standing
+    assert 0.6 <= row["friction"] <= 1.0
+    assert 0.0 < row["greatest torque by limit"] <= 1.0
+
+
+def test_all_benches_have_names_of_their_own_and_independent_trials() -> None:
+    assert len({bench.name for bench in BENCHES}) == len(BENCHES)
+    for bench in BENCHES:
+        assert len(set(bench.trials)) == len(bench.trials) > 0
