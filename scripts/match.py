@@ -8,6 +8,7 @@ if __name__ == "__main__":
     _environment.prepare()
 
 import json
+import os
 import signal
 import sys
 from datetime import datetime
@@ -82,7 +83,8 @@ def main(
                     logs=logs,
                 )
             else:
-                summary = play_lockstep(seed, scenario, record=folder, progress=show)
+                two_cores = (os.cpu_count() or 1) > 1
+                summary = play_lockstep(seed, scenario, record=folder, progress=show, eyes_beside=two_cores)
     except BadInputError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from None

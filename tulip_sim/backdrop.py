@@ -69,16 +69,16 @@ class Backdrop:
         directions = (camera_in_map[:3, :3].astype(np.float32) @ self._rays).reshape(3, *self._shape)
         steepness = -directions[2]
         reach = np.float32(height) / np.maximum(steepness, np.float32(STEEPEST))
-        ground = np.stack([directions[0] * reach + np.float32(x), directions[1] * reach + np.float32(y)], axis=2)
+        ground_x, ground_y = directions[0] * reach + np.float32(x), directions[1] * reach + np.float32(y)
         sees_ground = steepness > STEEPEST
         if math.hypot(x, y) < self._wall_radius - WALL_GAP:  # else the wall stands in no ray's way
             within = np.float32((self._wall_radius + WALL_GAP) ** 2)
-            sees_ground &= ground[..., 0] ** 2 + ground[..., 1] ** 2 < within
-        ground -= np.array([self._ground.left, self._ground.lower], np.float32)
+            sees_ground &= ground_x * ground_x + ground_y * ground_y < within
+        ground = ground_x - np.float32(self._ground.left), ground_y - np.float32(self._ground.lower)
         index = np.zeros((self._height, self._width), np.uint8)
         for first, last, level, samples in self._strips(sees_ground.any(axis=1), steepness.mean(axis=1), height):
-            blocks = ground[first // BLOCK : -(-last // BLOCK) + 2]
-            self._draw_ground(index[first:last], blocks, level, samples)
+            blocks = slice(first // BLOCK, -(-last // BLOCK) + 2)
+            self._draw_ground(index[first:last], ground[0][blocks], ground[1][blocks], level, samples)
         picture = np.asarray(cv2.applyColorMap(index, self._palette), np.uint8)
         self._draw_wall(picture, directions, (x, y, height))
         return picture
@@ -125,23 +125,23 @@ class Backdrop:
         samples = min(max(math.ceil(along / (SPACING * self._ground.resolution(level))), 1), MOST_SAMPLES)
         return level, samples
 
-    def _draw_ground(self, index: Bytes, ground: Float, level: int, samples: int) -> None:
+    def _draw_ground(self, index: Bytes, x: Float, y: Float, level: int, samples: int) -> None:
         """Fill rows of the index picture.
 
         Args:
             index: The rows, drawn into.
-            ground: (blocks, columns, 2) where rays meet the ground [m], from the corner of its pictures.
+            x, y: (blocks, columns) where rays meet the ground [m], from the corner of its pictures.
             level: Of the ground's picture to read.
             samples: For each row.
         """
         pixel = np.float32(self._ground.resolution(level))
-        places = self._finer(ground / pixel - np.float32(0.5), BLOCK * samples, BLOCK)
+        u, v = (self._finer(place / pixel - np.float32(0.5), BLOCK * samples, BLOCK) for place in (x, y))
         rows = index.shape[0]
-        places = places[: rows * samples, : self._width]
+        part = slice(rows * samples), slice(self._width)
         read = cv2.remap(
             self._ground.levels[level],
-            places,
-            None,
+            u[part],
+            v[part],
             cv2.INTER_LINEAR,
             borderMode=cv2.BORDER_CONSTANT,
             borderValue=FLOOR,

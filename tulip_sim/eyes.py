@@ -130,5 +130,5 @@ def _serve(pipe: Connection, parameters: EyesParameters) -> None:
             else:
                 eyes.look(*request)
                 pipe.send(eyes.collect())
-    except (EOFError, KeyboardInterrupt):
+    except (EOFError, BrokenPipeError, KeyboardInterrupt):
         pass  # the lockstep has ended

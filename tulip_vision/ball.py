@@ -180,12 +180,17 @@ def _fit_cone(start: Array, rays: Array, pixel: float) -> tuple[Array, float, fl
 def _cones(axis: Array, openings: Sequence[float], count: int) -> Array:
     """Return `count` unit vectors, one after the other, at each of some angles [rad] around a unit vector (3,)."""
     helper = np.array([0.0, 0.0, 1.0]) if abs(axis[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
-    right = np.cross(axis, helper)
-    right /= np.linalg.norm(right)
-    up = np.cross(right, axis)
+    right, up = _cross(axis, helper), _cross(_cross(axis, helper), axis)
+    right, up = right / np.linalg.norm(right), up / np.linalg.norm(up)
     turn = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)[:, None]
     ring = np.cos(turn) * right + np.sin(turn) * up
     return np.concatenate([math.cos(opening) * axis + math.sin(opening) * ring for opening in openings])
+
+
+def _cross(first: Array, second: Array) -> Array:
+    """Return the cross product of two vectors (3,), for which np.cross is slow."""
+    (a, b, c), (x, y, z) = first.tolist(), second.tolist()
+    return np.array([b * z - c * y, c * x - a * z, a * y - b * x])
 
 
 def _visible_disk_area(view: View, axis: Array, radius: float, pixel: float) -> float:

@@ -21,6 +21,8 @@ from tulip_vision.view import Array, Mask, View, angles
 
 ARMS = np.array([0.13, 0.17, 0.21, 0.25, 0.29, 0.33])
 """[m] Where an arm is looked at: beyond the width of the other line, before the next line of the field begins."""
+BETWEEN = np.array([[a * reach, b * reach] for a in (1.0, -1.0) for b in (1.0, -1.0) for reach in (0.14, 0.2)])
+"""(8, 2) places between the arms, along both lines [m]."""
 LEAST_MARK_AREA = 8.0
 """[px^2] at 4 m the penalty mark covers about 12."""
 BODY_HALF_WIDTH = 0.25
@@ -232,16 +234,17 @@ def _shape(
 ) -> tuple[FeatureClass | None, float, str]:
     """Read the shape of a crossing from the picture: kind or None, confidence, reason of refusal."""
     along = place.arms().reshape(-1, 2)
-    diagonals = [a * place.first + b * place.second for a in (1.0, -1.0) for b in (1.0, -1.0)]
-    between = np.concatenate([place.point + np.array([[0.14], [0.2]]) * diagonal for diagonal in diagonals])
-    images = (segmentation.whiteness, segmentation.classes)
-    (carpet_values, classes), carpet_inside = view.sample_all(images, view.pixels_on_ground(between))
-    on_green = belongs(classes, Colour.GREEN) & carpet_inside
+    between = place.point + BETWEEN @ np.stack([place.first, place.second])
+    pixels = view.pixels_on_ground(np.concatenate([along, between]))
+    images = (whiteness, segmentation.whiteness, segmentation.classes)
+    (values, plain_values, classes), inside = view.sample_all(images, pixels)
+    arms = slice(len(along))
+    rest = slice(len(along), None)
+    on_green = belongs(classes[rest], Colour.GREEN) & inside[rest]
     if np.count_nonzero(on_green) < 5:
         return None, 0.0, "little carpet between the arms"
-    images = (whiteness, segmentation.classes)
-    (values, arm_classes), inside = view.sample_all(images, view.pixels_on_ground(along))
-    carpet = float(np.median(carpet_values[on_green]))
+    values, arm_classes, inside = values[arms], classes[arms], inside[arms]
+    carpet = float(np.median(plain_values[rest][on_green]))
     samples = values.reshape(4, len(ARMS)).astype(np.float64)
     seen = inside.reshape(4, len(ARMS))
     medians = np.where(seen.all(axis=1), np.median(samples, axis=1), carpet)

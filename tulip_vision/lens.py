@@ -75,6 +75,7 @@ class Lens:
         self.camera_matrix = matrix
         self.distortion = coefficients
         self.model = model
+        self._coarse_ray_tables: dict[int, NDArray[np.float32]] = {}
 
     @classmethod
     def from_camera_info(cls, info: Mapping[str, Any]) -> Lens:
@@ -163,6 +164,19 @@ class Lens:
             (height, width, 3) unit vectors in camera_optical_frame, read-only.
         """
         return self._ray_table
+
+    def coarse_ray_table(self, step: int) -> NDArray[np.float32]:
+        """Return the direction seen at one pixel of each block of step x step pixels, computed once for each step.
+
+        Returns:
+            (rows, columns, 3) unit vectors in camera_optical_frame, read-only, of the pixels whose row and column are
+            step // 2, step // 2 + step, and so on.
+        """
+        if step not in self._coarse_ray_tables:
+            table = np.ascontiguousarray(self._ray_table[step // 2 :: step, step // 2 :: step])
+            table.setflags(write=False)
+            self._coarse_ray_tables[step] = table
+        return self._coarse_ray_tables[step]
 
     def angle_per_pixel(self, cosine: float) -> float:
         """Return how much one pixel sees, across the way to the picture's middle [rad].

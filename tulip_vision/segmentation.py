@@ -241,8 +241,7 @@ class Segmenter:
         rows = len(coarse)
         rays = view.lens.ray_table()
         lowest = view.height / math.hypot(view.height, parameters.farthest)  # sine of the angle below the horizon
-        some = rays[step // 2 :: step, step // 2 :: step].reshape(-1, 3)
-        below = (some @ view.rotation[2].astype(np.float32) < -lowest).reshape(coarse.shape)
+        below = view.coarse_sines(step) < -lowest
         # Thick lines divide runs, so white is part of them; but a grey floor counts as white now and then, and so
         # white joins no parts, and the carpet's edge itself is green.
         carpet = _large_parts(belongs(coarse, Colour.GREEN | Colour.ORANGE) & below)

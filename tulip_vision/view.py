@@ -19,10 +19,8 @@ from tulip_vision.lens import Lens
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
-HORIZON_STEP = 64
-"""[px] between the pixels of a row that tell on which side of the horizon it lies."""
-HORIZON_MARGIN = 0.015
-"""Sine of the elevation: more than it may differ from an even change between those pixels, in any usual lens."""
+HORIZON_STEP = 8
+"""[px] width of the blocks that tell on which side of the horizon a row lies."""
 
 
 @dataclass(frozen=True)
@@ -90,20 +88,29 @@ class View:
         seen: Array = self.lens.ray_table()[:, self.lens.width // 2].astype(np.float64) @ self.rotation[2]
         return seen
 
+    def coarse_sines(self, step: int) -> NDArray[np.float32]:
+        """Return (rows, columns) sine of the elevation seen at the pixels of `Lens.coarse_ray_table`."""
+        rays = self.lens.coarse_ray_table(step)
+        sines: NDArray[np.float32] = rays.reshape(-1, 3) @ self.rotation[2].astype(np.float32)
+        return sines.reshape(rays.shape[:2])
+
     @cached_property
     def below_horizon(self) -> Mask:
         """(height, width) 255 where a pixel looks below the horizon, else 0."""
-        rays, up = self.lens.ray_table(), self.rotation[2].astype(np.float32)
-        # Most rows lie on one side of the horizon as a whole, as some of their pixels tell: only the rest is work.
-        columns = [*range(0, self.lens.width - 1, HORIZON_STEP), self.lens.width - 1]
-        some = (rays[:, columns].reshape(-1, 3) @ up).reshape(-1, len(columns))
-        highest, lowest = some.max(axis=1), some.min(axis=1)
-        below: Mask = np.zeros(rays.shape[:2], dtype=np.uint8)
-        below[highest < -HORIZON_MARGIN] = 255
-        mixed = np.flatnonzero((highest >= -HORIZON_MARGIN) & (lowest <= HORIZON_MARGIN))
+        # Most rows lie on one side of the horizon as a whole, as one pixel in a block tells: only the rest is work.
+        coarse = self.coarse_sines(HORIZON_STEP)
+        margin = 2.0 * HORIZON_STEP / float(self.lens.camera_matrix[1, 1])  # more than sines change within a block
+        side = np.zeros(self.lens.height, dtype=np.int8)  # -1 below, 1 above, 0 not known
+        blocks = (coarse.min(axis=1) > margin).astype(np.int8) - (coarse.max(axis=1) < -margin)
+        rows = np.repeat(blocks, HORIZON_STEP)[: len(side)]
+        side[: len(rows)] = rows
+        below: Mask = np.zeros((self.lens.height, self.lens.width), dtype=np.uint8)
+        below[side < 0] = 255
+        mixed = np.flatnonzero(side == 0)
         if len(mixed):
-            rows = slice(int(mixed[0]), int(mixed[-1]) + 1)
-            below[rows] = np.where(cv2.transform(rays[rows], up[None]) < 0.0, np.uint8(255), np.uint8(0))
+            part = slice(int(mixed[0]), int(mixed[-1]) + 1)
+            sines = cv2.transform(self.lens.ray_table()[part], self.rotation[2:].astype(np.float32))
+            below[part] = np.where(sines < 0.0, np.uint8(255), np.uint8(0))
         return below
 
     @cached_property
