@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotrf, dpotrs
 
 from tulip_description import frames
 from tulip_motion.gait import FootMotion
@@ -134,7 +134,7 @@ class InverseKinematics:
         self._task_of_base = np.zeros((12, 6))
         self._base_of_joints = np.zeros((6, 12))
         self._base_of_wrench = np.eye(6)
-        self._factor = (np.eye(12), False)
+        self._factor = np.eye(12)
         self._stance = Side.LEFT
 
     def reset(self, base_rotation: Array, base_position: Array, joint_positions: Array) -> None:
@@ -182,7 +182,9 @@ class InverseKinematics:
         self._base_of_joints = -self._base_of_wrench @ fixed[:, 6:]
         self._task_of_base = task[:, :6]
         self.jacobian = task[:, 6:] + self._task_of_base @ self._base_of_joints
-        self._factor = cho_factor(self.jacobian.T @ self.jacobian + self._damping, check_finite=False)
+        # The damped normal matrix is positive definite: one Cholesky factor serves velocities and accelerations.
+        # Called without scipy's checks, which cost more than the factorization.
+        self._factor, _ = dpotrf(self.jacobian.T @ self.jacobian + self._damping)
         self._stance = stance
 
     def solve_velocity(self, target: TaskTarget) -> None:
@@ -242,5 +244,5 @@ class InverseKinematics:
         return solve_3(matrix, matrix.T @ angular_velocity + self._gain_orientation * error)
 
     def _damped_solve(self, rate: Array) -> Array:
-        solution: Array = cho_solve(self._factor, self.jacobian.T @ rate, check_finite=False)
+        solution: Array = dpotrs(self._factor, self.jacobian.T @ rate)[0]
         return solution
