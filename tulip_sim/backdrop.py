@@ -130,7 +130,8 @@ class Backdrop:
 
         Args:
             index: The rows, drawn into.
-            x, y: (blocks, columns) where rays meet the ground [m], from the corner of its pictures.
+            x: (blocks, columns) where rays meet the ground [m], from the corner of its pictures.
+            y: The same, (blocks, columns).
             level: Of the ground's picture to read.
             samples: For each row.
         """
@@ -170,6 +171,11 @@ class Backdrop:
         c = np.float32(x * x + y * y - self._wall_radius**2)
         reach = (np.sqrt(b * b - a * c) - b) / a
         z = reach * dz + np.float32(height)
+        above = np.flatnonzero(z.max(axis=1) > 0.0)
+        if not len(above):
+            return
+        last = int(above[-1]) + 4  # what is left out sees the ground only
+        dx, dy, z, reach = dx[:last], dy[:last], z[:last], reach[:last]
         wall_x, wall_y = dx * reach + np.float32(x), dy * reach + np.float32(y)
         # Counted from the middle of the view, so that the jump by a whole turn lies behind the camera.
         middle = math.atan2(float(wall_y.mean()), float(wall_x.mean()))

@@ -191,9 +191,7 @@ def _find_circle(
     chosen = np.flatnonzero(clear & near)
     if len(chosen) < parameters.circle_points:
         return None, none
-    focal = float(view.lens.camera_matrix[0, 0])
-    ahead = np.column_stack([points.flat[chosen] + 2.0 * directions[chosen], np.full(len(chosen), focal)])
-    tangent = view.ground(ahead @ view.rotation.T) - points.ground[chosen]
+    tangent = _to_ground(points.flat[chosen] + 2.0 * directions[chosen], view) - points.ground[chosen]
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
     normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
     ground = points.ground[chosen]
@@ -268,12 +266,9 @@ def _find_pieces(
     least_cosine = math.cos(parameters.alignment)
     # Single precision halves the time of the large arrays, and is exact to 1e-4 px. The third column takes away each
     # line's distance from the middle, and lets points without a direction of their own agree with all lines.
-    beside = _product(
-        np.column_stack([tried[:, 1], -tried[:, 0], -distances]), np.column_stack([flat, 0.0 * clear + 1.0])
-    )
-    alike = _product(
-        np.column_stack([tried, np.ones(len(tried))]), np.column_stack([directions, np.where(clear, 0.0, 9.0)])
-    )
+    one, agreeing = np.ones(len(flat)), np.where(clear, 0.0, 9.0)
+    beside = _product(np.column_stack([tried[:, 1], -tried[:, 0], -distances]), np.column_stack([flat, one]))
+    alike = _product(np.column_stack([tried, one[candidates]]), np.column_stack([directions, agreeing]))
     support = ((beside < 1.5 * parameters.tolerance) & (alike > least_cosine)).astype(np.float32)
     alive = np.ones(len(flat), dtype=np.float32)
     pieces: list[LinePiece] = []
@@ -292,12 +287,17 @@ def _find_pieces(
             if len(refined) < parameters.least_points:
                 break
             members = refined
-        run = _longest_run(flat[members], view, parameters)
-        members = members[run]
+        points = flat[members]
+        line = _fit(points)
+        run = _longest_run(points, line, view, parameters)
+        if len(run) < len(members):
+            members = members[run]
+            points = flat[members]
+            line = _fit(points)
         alive[members] = 0.0
         support[best] = 0.0
         if len(members) >= parameters.least_points:
-            piece = _piece(flat[members], view)
+            piece = _piece(points, line, view)
             if piece is not None and piece.length >= parameters.least_length:
                 pieces.append(piece)
     return pieces
@@ -319,17 +319,17 @@ def _fit(points: Array) -> tuple[Array, Array]:
 
 
 def _to_ground(flat: Array, view: View) -> Array:
-    rays = np.column_stack([flat, np.full(len(flat), float(view.lens.camera_matrix[0, 0]))])
-    return view.ground(rays @ view.rotation.T)
+    focal = float(view.lens.camera_matrix[0, 0])
+    return view.ground(flat @ view.rotation[:, :2].T + focal * view.rotation[:, 2])
 
 
-def _longest_run(points: Array, view: View, parameters: LineParameters) -> NDArray[np.intp]:
+def _longest_run(points: Array, line: tuple[Array, Array], view: View, parameters: LineParameters) -> NDArray[np.intp]:
     """Return the indices of the points of the part without a gap that has most points."""
-    centre, along = _fit(points)
+    centre, along = line
     place = (points - centre) @ along
     order = np.argsort(place)
     place = place[order]
-    gaps = np.flatnonzero(np.diff(place) > parameters.largest_gap_pixels)
+    gaps = np.flatnonzero(place[1:] - place[:-1] > parameters.largest_gap_pixels)
     if not len(gaps):
         return order
     before, after = (_to_ground(centre + place[ends, None] * along, view) for ends in (gaps, gaps + 1))
@@ -362,8 +362,8 @@ def _bent(place: Array, across: Array, residual: float) -> bool:
     return sagitta > 1.0 and math.sqrt(rest) < 0.6 * residual
 
 
-def _piece(points: Array, view: View) -> LinePiece | None:
-    centre, along = _fit(points)
+def _piece(points: Array, line: tuple[Array, Array], view: View) -> LinePiece | None:
+    centre, along = line
     offset = points - centre
     place = offset @ along
     across = offset @ np.array([-along[1], along[0]])

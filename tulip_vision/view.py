@@ -144,8 +144,7 @@ class View:
             (n, 2) x, y in base_footprint [m]; NaN where the direction does not point below the horizon.
         """
         down = directions[:, 2]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            reach = np.where(down < -1e-6, -self.height / down, np.nan)
+        reach = -self.height / np.where(down < -1e-6, down, np.nan)
         met: Array = self.position[:2] + directions[:, :2] * reach[:, None]
         return met
 
