@@ -18,7 +18,6 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
 from tulip_sim.match_graph import play_graph
@@ -108,10 +107,8 @@ def report(summary: TrialSummary, console: Console) -> None:
     """Print the summary."""
     verdict = "GOAL" if summary.scored else "no goal"
     console.print(f"[bold]{verdict}[/] (seed {summary.seed}, {summary.mode})")
-    table = Table(box=None, show_header=False, pad_edge=False)
     for name, value in summary.lines():
-        table.add_row(name, value)
-    console.print(table, soft_wrap=True)
+        console.print(f"{name:<21}{value}", highlight=False, markup=False, soft_wrap=True)
 
 
 if __name__ == "__main__":
