@@ -67,7 +67,7 @@ def test_trials_are_counted_and_listed() -> None:
     text = "\n".join(trial.summarize(TRIAL_ROWS))
     assert "goals: 2 of 3; median time to goal 30 s" in text
     assert "falls: 3" in text
-    assert "median of the trials' RMS: 0.20 m, 2.0 deg" in text
+    assert "median of the trials' RMS: 0.200 m, 2.0 deg" in text
     assert "| 2 | fallen | 60.0 s | 5 | 2 | 3.0 m | 0.30 m, 2.0 deg |" in text
 
 
