@@ -68,7 +68,7 @@ def test_trials_are_counted_and_listed() -> None:
     assert "goals: 2 of 3; median time to goal 30 s" in text
     assert "falls: 3" in text
     assert "median of the trials' RMS: 0.200 m, 2.0 deg" in text
-    assert "| 2 | fallen | 60.0 s | 5 | 2 | 3.0 m | 0.30 m, 2.0 deg |" in text
+    assert "| 2 | fallen | 60.0 s | 5 | 2 | 3.0 m | 0.300 m, 2.0 deg |" in text
 
 
 def test_trials_without_a_goal_have_no_time_to_goal() -> None:
