@@ -89,12 +89,17 @@ class EyesBeside:
     """Camera and vision in a process of their own."""
 
     def __init__(self, parameters: EyesParameters) -> None:
-        """Start the process."""
+        """Start the process and wait until it is ready.
+
+        Raises:
+            EOFError: if it cannot start; its own error stands on standard error.
+        """
         context = multiprocessing.get_context("spawn")  # a forked child would inherit locks of running threads
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(theirs, parameters), daemon=True)
         self._process.start()
         theirs.close()
+        self._pipe.recv()  # ready: the process needs some seconds for its imports
 
     def expose(self, truth: Truth) -> None:
         """Take a picture of what is."""
@@ -123,6 +128,7 @@ def _serve(pipe: Connection, parameters: EyesParameters) -> None:
     cv2.setNumThreads(1)
     eyes = OwnEyes(parameters)
     try:
+        pipe.send("ready")
         while True:
             request = pipe.recv()
             if isinstance(request, Truth):
