@@ -25,9 +25,9 @@ from tulip_sim.scene import (
     Cylinder,
     Scene,
     goal_cylinders,
-    keeper_boxes,
     net_threads,
     pole_cylinders,
+    scene_of,
 )
 from tulip_sim.solids import SHIFT, View, box_faces, cylinder_faces, join
 from tulip_sim.truth import Truth
@@ -42,8 +42,6 @@ LINE_COLOUR = (216, 222, 220)
 WALL_RADIUS = 8.5  # [m] of the round hall; the carpet's corner is at 6.4
 WALL_HEIGHT = 6.0  # [m] enough for a camera that looks up by 30 deg
 WALL_PIXEL = 0.02  # [m] what a pixel sees at 9 m
-KEEPER_SHADOW = 0.26  # [m]
-FOOT_SHADOW = 0.14  # [m]
 POLE_SHADOW = 0.22  # [m]
 THREAD_PIECES = 6  # straight pieces of a thread of the net under distortion
 NOISE_MARGIN = 64  # [px] by which the noise tile is larger than the picture: 4096 places to cut from
@@ -149,16 +147,7 @@ class CameraRenderer:
             truth: The world.
             rng: Where flicker and noise come from.
         """
-        base = np.eye(4)
-        base[:3, :3] = _rotation(truth.base_orientation)
-        base[:3, 3] = truth.base_position
-        links = self._body.links_in_map(base, truth.joint_positions)
-        boxes = self._body.boxes(links)
-        shadows = [(x, y, FOOT_SHADOW) for x, y in self._body.feet(links)]
-        if truth.keeper is not None:
-            boxes = boxes + keeper_boxes(truth.keeper, self._parameters.keeper_colour)
-            shadows.append((truth.keeper.x, truth.keeper.y, KEEPER_SHADOW))
-        scene = Scene(truth.ball_position, boxes, truth.poles, tuple(shadows))
+        scene, links = scene_of(truth, self._body, self._parameters.keeper_colour)
         return self.expose(self.render_scene(self._body.camera_in_map(links), scene), rng)
 
     def render_scene(self, camera_in_map: Array, scene: Scene) -> Bytes:
@@ -275,15 +264,3 @@ def _noise_tile(lens: Lens, deviation: float, rng: np.random.Generator) -> Bytes
     noise *= np.float32(deviation / float(noise.std()))
     tile: Bytes = np.clip(noise + 128.0, 0.0, 255.0).round().astype(np.uint8)
     return tile
-
-
-def _rotation(quaternion: Array) -> Array:
-    """Return the rotation matrix of a unit quaternion x, y, z, w."""
-    x, y, z, w = (float(value) for value in quaternion / np.linalg.norm(quaternion))
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )

@@ -14,6 +14,7 @@ from tulip_description.keeper import keeper_parts
 from tulip_description.planar import Pose2D
 from tulip_description.robot import Robot
 from tulip_sim.solids import Colour, View
+from tulip_sim.truth import Truth
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,8 @@ COLOURS: dict[str, Colour] = {
 }
 """BGR of things in full light."""
 
+KEEPER_SHADOW = 0.26  # [m]
+FOOT_SHADOW = 0.14  # [m]
 THREAD_GAP = 0.15  # [m] between two threads of a net
 UNSEEN = ("neck", "head")  # links that carry the camera; it does not see them
 
@@ -234,3 +237,35 @@ def _cross_matrix(axis: Sequence[float]) -> Array:
     """Return the (3, 3) matrix that takes a vector to the cross product of an axis with it."""
     x, y, z = axis
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def scene_of(truth: Truth, body: Body, keeper_colour: str) -> tuple[Scene, dict[str, Array]]:
+    """Return what stands on the field at one instant, and the (4, 4) pose of each of the robot's links in map.
+
+    Args:
+        truth: The world.
+        body: The robot's shape, with the parts that are to be seen.
+        keeper_colour: Of the keeper's markers.
+    """
+    base = np.eye(4)
+    base[:3, :3] = _rotation(truth.base_orientation)
+    base[:3, 3] = truth.base_position
+    links = body.links_in_map(base, truth.joint_positions)
+    boxes = body.boxes(links)
+    shadows = [(x, y, FOOT_SHADOW) for x, y in body.feet(links)]
+    if truth.keeper is not None:
+        boxes = boxes + keeper_boxes(truth.keeper, keeper_colour)
+        shadows.append((truth.keeper.x, truth.keeper.y, KEEPER_SHADOW))
+    return Scene(truth.ball_position, boxes, truth.poles, tuple(shadows)), links
+
+
+def _rotation(quaternion: Array) -> Array:
+    """Return the rotation matrix of a unit quaternion x, y, z, w."""
+    x, y, z, w = (float(value) for value in quaternion / np.linalg.norm(quaternion))
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )

@@ -7,13 +7,12 @@ import math
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from tulip_description.field import Field, Goal
 from tulip_description.planar import Pose2D
 from tulip_description.robot import Robot
-from tulip_sim.camera import FOOT_SHADOW, KEEPER_SHADOW, CameraParameters, CameraRenderer
-from tulip_sim.scene import Body, Scene, keeper_boxes
+from tulip_sim.camera import CameraParameters, CameraRenderer
+from tulip_sim.scene import Body, scene_of
 from tulip_sim.truth import Truth
 from tulip_vision.lens import Lens
 
@@ -71,16 +70,7 @@ class Spectator:
             truth: The world.
             camera_in_map: (4, 4) transform of the camera's optical frame in map, as from `look_at`.
         """
-        base = np.eye(4)
-        base[:3, :3] = Rotation.from_quat(truth.base_orientation).as_matrix()
-        base[:3, 3] = truth.base_position
-        links = self._body.links_in_map(base, truth.joint_positions)
-        boxes = self._body.boxes(links)
-        shadows = [(x, y, FOOT_SHADOW) for x, y in self._body.feet(links)]
-        if truth.keeper is not None:
-            boxes = boxes + keeper_boxes(truth.keeper, self._parameters.keeper_colour)
-            shadows.append((truth.keeper.x, truth.keeper.y, KEEPER_SHADOW))
-        scene = Scene(truth.ball_position, boxes, truth.poles, tuple(shadows))
+        scene, _ = scene_of(truth, self._body, self._parameters.keeper_colour)
         fine = self._renderer.render_scene(camera_in_map, scene)
         picture = cv2.resize(fine, self._size, interpolation=cv2.INTER_AREA)
         return np.asarray(cv2.convertScaleAbs(picture, alpha=EXPOSURE), np.uint8)

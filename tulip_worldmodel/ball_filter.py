@@ -7,14 +7,14 @@ where the filter cannot explain it, the filter starts anew there, with the veloc
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tulip_vision.features import Feature, FeatureClass, Features
 from tulip_worldmodel.mahalanobis import gate
-from tulip_worldmodel.moving_point import MovingPoint, PointEstimate, PointMotion, position_noise
+from tulip_worldmodel.moving_point import MovingPoint, PointEstimate, PointMotion, check_tracking, position_noise
 from tulip_worldmodel.odometry_history import Increment
 from tulip_worldmodel.rejected import Rejected
 from tulip_worldmodel.sighting import Observer, Sighting, in_view
@@ -56,13 +56,7 @@ class BallParameters:
         Raises:
             ValueError: if one is out of range.
         """
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{entry.name} is {value}; expected a finite value > 0")
-        for name in ("gate_probability", "confidence_gain", "confirmed", "forgotten"):
-            if getattr(self, name) >= 1.0:
-                raise ValueError(f"{name} is {getattr(self, name)}; expected < 1")
+        check_tracking(self)
 
 
 class BallFilter:

@@ -5,7 +5,9 @@ State: position [m] and velocity [m/s] in odom, (4,).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
@@ -15,6 +17,24 @@ from tulip_worldmodel.mahalanobis import distances_and_determinants
 from tulip_worldmodel.sighting import Sighting
 
 Array = NDArray[np.float64]
+
+
+def check_tracking(parameters: Any) -> None:
+    """Check the parameters of a filter that tracks a moving point: all positive, shares and confidences below one.
+
+    Args:
+        parameters: Object of a dataclass of numbers.
+
+    Raises:
+        ValueError: if one is out of range.
+    """
+    for entry in fields(parameters):
+        value = getattr(parameters, entry.name)
+        if not (math.isfinite(value) and value > 0.0):
+            raise ValueError(f"{entry.name} is {value}; expected a finite value > 0")
+    for name in ("gate_probability", "confidence_gain", "confirmed", "forgotten"):
+        if getattr(parameters, name) >= 1.0:
+            raise ValueError(f"{name} is {getattr(parameters, name)}; expected < 1")
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from tulip_description.planar import wrap_angle
 from tulip_vision.features import FeatureClass, Features
 from tulip_worldmodel.association import assign
 from tulip_worldmodel.mahalanobis import gate
-from tulip_worldmodel.moving_point import MovingPoint, PointEstimate, PointMotion, position_noise
+from tulip_worldmodel.moving_point import MovingPoint, PointEstimate, PointMotion, check_tracking, position_noise
 from tulip_worldmodel.odometry_history import Increment
 from tulip_worldmodel.rejected import Rejected
 from tulip_worldmodel.sighting import Observer, Sighting, in_view
@@ -52,13 +52,7 @@ class OpponentParameters:
         Raises:
             ValueError: if one is out of range.
         """
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{entry.name} is {value}; expected a finite value > 0")
-        for name in ("gate_probability", "confidence_gain", "confirmed", "forgotten"):
-            if getattr(self, name) >= 1.0:
-                raise ValueError(f"{name} is {getattr(self, name)}; expected < 1")
+        check_tracking(self)
 
 
 class Opponent:
