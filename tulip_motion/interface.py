@@ -8,6 +8,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_description.planar import Pose2D
+
 Array = NDArray[np.float64]
 
 
@@ -20,21 +22,25 @@ class WalkMode(IntEnum):
     """Stop walking and stand."""
     WALK = 2
     """Walk with the commanded velocity; zero velocity steps in place."""
+    GO = 3
+    """Walk to the goal, put the feet side by side there, and stand."""
 
 
 @dataclass(frozen=True)
 class WalkCommand:
-    """Velocity command for the legs.
+    """What the legs shall do, by velocity or by where the feet shall stand.
 
     Attributes:
         stamp: Stamp of the newest input used [ns].
         mode: See `WalkMode`.
-        velocity: (3,) forward [m/s], left [m/s] and turning rate [rad/s], of base_footprint in itself.
+        velocity: (3,) forward [m/s], left [m/s] and turning rate [rad/s], of base_footprint in itself, for WALK.
+        goal: Where the middle between the ankles shall be, in odom [m], [rad], for GO.
     """
 
     stamp: int
     mode: WalkMode
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    goal: Pose2D = field(default_factory=Pose2D)
 
 
 class Side(IntEnum):
@@ -49,6 +55,17 @@ class Side(IntEnum):
         return Side.RIGHT if self is Side.LEFT else Side.LEFT
 
 
+class KickKind(IntEnum):
+    """How the foot meets the ball."""
+
+    FORWARD = 0
+    """With the toe, from standing."""
+    SIDE = 1
+    """With the outer side of the foot, from standing: the left foot kicks to the left."""
+    WALKING = 2
+    """With the toe, by one step of a walk that goes on: for dribbling."""
+
+
 @dataclass(frozen=True)
 class KickGoal:
     """Goal of the Kick action.
@@ -56,12 +73,16 @@ class KickGoal:
     Attributes:
         side: The foot that kicks.
         direction: Where the ball shall go, in base_footprint [rad], 0 forward.
-        speed: Wanted speed of the foot at the ball [m/s].
+        speed: Wanted speed of the ball [m/s].
+        kind: See `KickKind`.
+        ball: (x, y) of the ball's centre in base_footprint [m], or None if it lies where this kick expects it.
     """
 
     side: Side
     direction: float = 0.0
     speed: float = 3.0
+    kind: KickKind = KickKind.FORWARD
+    ball: tuple[float, float] | None = None
 
 
 class MotionMode(IntEnum):
@@ -95,6 +116,8 @@ class Odometry:
         linear_velocity: (3,) of base_link, in base_footprint axes [m/s].
         angular_velocity: (3,) of base_link, in base_link axes [rad/s].
         distance: Path length walked since the start [m].
+        covariance: (6, 6) of the pose in odom: position [m^2], then rotation about fixed axes [rad^2].
+        twist_covariance: (6, 6) of linear and angular velocity, in the axes of each [(m/s)^2], [(rad/s)^2].
     """
 
     stamp: int
@@ -103,6 +126,8 @@ class Odometry:
     linear_velocity: Array
     angular_velocity: Array
     distance: float
+    covariance: Array = field(default_factory=lambda: np.zeros((6, 6)))
+    twist_covariance: Array = field(default_factory=lambda: np.zeros((6, 6)))
 
 
 @dataclass(frozen=True)
@@ -123,7 +148,8 @@ class MotionState:
         joint_positions, joint_positions_desired: (12,) [rad].
         joint_velocities, joint_velocities_desired: (12,) [rad/s].
         torque_feedback, torque_feedforward, torque_learned: (12,) parts of eq. (12) [N m].
-        reason: Why the mode is what it is, in words (fall, refused kick, clipped command), or "".
+        reason: Why the mode is what it is, in words (a fall, limp on request), or "".
+        notes: What somebody should know besides, in words: a command that was clipped, learning switched off.
     """
 
     stamp: int
@@ -148,6 +174,7 @@ class MotionState:
     torque_feedforward: Array
     torque_learned: Array = field(default_factory=lambda: np.zeros(12))
     reason: str = ""
+    notes: tuple[str, ...] = ()
 
 
 class HeadMode(IntEnum):

@@ -12,6 +12,7 @@ from sensor_msgs.msg import Imu, JointState
 from tf2_msgs.msg import TFMessage
 
 from tulip_description import frames
+from tulip_description.planar import Pose2D
 from tulip_description.robot import JOINTS
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_motion.interface import (
@@ -118,7 +119,10 @@ def joint_command_from_message(message: JointCommandMessage) -> JointCommand:
 def walk_command_to_message(command: WalkCommand) -> WalkCommandMessage:
     """Return a walk command as a message."""
     return WalkCommandMessage(
-        header=header(command.stamp, frames.BASE_FOOTPRINT), mode=int(command.mode), velocity=list(command.velocity)
+        header=header(command.stamp, frames.BASE_FOOTPRINT),
+        mode=int(command.mode),
+        velocity=list(command.velocity),
+        goal=[command.goal.x, command.goal.y, command.goal.yaw],
     )
 
 
@@ -129,7 +133,7 @@ def walk_command_from_message(message: WalkCommandMessage) -> WalkCommand:
         ValueError: if the mode is unknown.
     """
     forward, left, turn = (float(value) for value in message.velocity)
-    return WalkCommand(stamp_of(message), WalkMode(message.mode), (forward, left, turn))
+    return WalkCommand(stamp_of(message), WalkMode(message.mode), (forward, left, turn), Pose2D(*_point(message.goal)))
 
 
 def head_command_to_message(command: HeadCommand) -> HeadCommandMessage:
@@ -168,6 +172,8 @@ def odometry_to_message(odometry: Odometry) -> OdometryMessage:
     turn.x, turn.y, turn.z, turn.w = odometry.orientation.tolist()
     twist.linear.x, twist.linear.y, twist.linear.z = odometry.linear_velocity.tolist()
     twist.angular.x, twist.angular.y, twist.angular.z = odometry.angular_velocity.tolist()
+    message.pose.covariance = odometry.covariance.ravel()
+    message.twist.covariance = odometry.twist_covariance.ravel()
     return message
 
 
@@ -182,6 +188,8 @@ def odometry_from_message(message: OdometryMessage) -> Odometry:
         np.array([twist.linear.x, twist.linear.y, twist.linear.z]),
         np.array([twist.angular.x, twist.angular.y, twist.angular.z]),
         0.0,
+        np.array(message.pose.covariance).reshape(6, 6),
+        np.array(message.twist.covariance).reshape(6, 6),
     )
 
 
@@ -242,6 +250,7 @@ def motion_state_to_message(state: MotionState, distance: float) -> MotionStateM
         right_sole=state.soles[1].ravel(),
         distance=distance,
         reason=state.reason,
+        notes=list(state.notes),
         **{name: getattr(state, name) for name in _STATE_ARRAYS},
     )
 
@@ -260,5 +269,6 @@ def motion_state_from_message(message: MotionStateMessage) -> MotionState:
         step_count=message.step_count,
         soles=np.stack([message.left_sole, message.right_sole]).reshape(2, 4, 4),
         reason=message.reason,
+        notes=tuple(message.notes),
         **{name: np.array(getattr(message, name)) for name in _STATE_ARRAYS},
     )

@@ -10,7 +10,7 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.task import Future
 
 from tulip_description.robot import load_robot
-from tulip_motion.interface import KickGoal, MotionMode, Side, WalkCommand, WalkMode
+from tulip_motion.interface import KickGoal, KickKind, MotionMode, Side, WalkCommand, WalkMode
 from tulip_motion.messages import (
     body_transforms,
     joint_command_to_message,
@@ -34,7 +34,7 @@ COMMAND_LIFE = 500_000_000  # [ns] a walking robot whose strategy is silent for 
 
 @dataclass
 class _RunningKick:
-    goal: ServerGoalHandle
+    handle: ServerGoalHandle
     done: Future
 
 
@@ -99,7 +99,7 @@ class MotionNode(ComponentNode):
         if self._kick is None:
             return
         if state.mode is MotionMode.KICK:
-            self._kick.goal.publish_feedback(Kick.Feedback(phase=state.phase))
+            self._kick.handle.publish_feedback(Kick.Feedback(phase=state.phase))
         else:
             succeeded = state.mode in (MotionMode.STAND, MotionMode.WALK)
             self._kick.done.set_result((succeeded, "" if succeeded else state.reason))
@@ -114,23 +114,27 @@ class MotionNode(ComponentNode):
             return
         self._walking_until = command.stamp + COMMAND_LIFE if command.mode is WalkMode.WALK else 0
 
-    async def _execute_kick(self, goal: ServerGoalHandle) -> Kick.Result:
+    async def _execute_kick(self, handle: ServerGoalHandle) -> Kick.Result:
         """Kick, or refuse: a goal is always accepted first, since only a result can carry the reason."""
-        wish = goal.request
-        if wish.side in (Kick.Goal.LEFT, Kick.Goal.RIGHT):
-            refusal = self._motion.start_kick(KickGoal(Side(wish.side), wish.direction, wish.speed))
-        else:
+        wish = handle.request
+        if wish.side not in (Kick.Goal.LEFT, Kick.Goal.RIGHT):
             refusal = f"side is {wish.side}; expected 0 (left) or 1 (right)"
+        elif wish.kind not in (Kick.Goal.FORWARD, Kick.Goal.SIDE, Kick.Goal.WALKING):
+            refusal = f"kind is {wish.kind}; expected 0 (forward), 1 (side) or 2 (walking)"
+        else:
+            ball = (float(wish.ball[0]), float(wish.ball[1])) if wish.has_ball else None
+            goal = KickGoal(Side(wish.side), wish.direction, wish.speed, KickKind(wish.kind), ball)
+            refusal = self._motion.start_kick(goal)
         if refusal:
             self.health.count("refused kick", f"kick refused: {refusal}")
             success, reason = False, refusal
         else:
-            self._kick = _RunningKick(goal, Future())
+            self._kick = _RunningKick(handle, Future())
             success, reason = await self._kick.done
         if success:
-            goal.succeed()
+            handle.succeed()
         else:
-            goal.abort()
+            handle.abort()
         return Kick.Result(success=success, reason=reason)
 
 

@@ -92,6 +92,7 @@ def decision_to_message(decision: Decision) -> DecisionMessage:
     if decision.kick is not None:
         message.kick_requested = True
         message.kick_side = decision.kick.side.value
+        message.kick_kind = decision.kick.kind.value
         message.kick_direction = decision.kick.direction
         message.kick_speed = decision.kick.speed
     return message
@@ -99,7 +100,14 @@ def decision_to_message(decision: Decision) -> DecisionMessage:
 
 def kick_goal_to_message(goal: KickGoal) -> Any:
     """Return a kick as the goal of the action."""
-    return Kick.Goal(side=goal.side.value, direction=goal.direction, speed=goal.speed)
+    return Kick.Goal(
+        side=goal.side.value,
+        kind=goal.kind.value,
+        direction=goal.direction,
+        speed=goal.speed,
+        has_ball=goal.ball is not None,
+        ball=list(goal.ball or (0.0, 0.0)),
+    )
 
 
 def world_state_from_message(message: WorldStateMessage) -> WorldState:

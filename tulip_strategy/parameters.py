@@ -67,7 +67,7 @@ class StrategyParameters:
     kick_settle_limit: float = 2.5  # [s] stop waiting for motion control to report that it stands
     kick_start_limit: float = 3.0  # [s] no kick has begun by then: it was refused
     kick_run_limit: float = 8.0  # [s] a kick lasts about 3 s; longer means that its end was not reported
-    kick_speed: float = 3.0  # [m/s] of the foot
+    kick_speed: float = 3.0  # [m/s] wanted of the ball
     kick_direction_limit: float = 0.2  # [rad] farther sideways the foot cannot swing
     kick_range: float = 3.5  # [m] ball to goal; farther, 5 deg of error miss the gap
     kick_range_end: float = 4.0  # [m] keeps a begun alignment when the estimate jumps

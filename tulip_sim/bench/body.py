@@ -20,9 +20,16 @@ from tulip_sim.world import World
 class Body:
     """World and motion control, with the tick of delay that the graph has. Friction, masses and sensors are random."""
 
-    def __init__(self, seed: int, robot: Pose2D, ball: tuple[float, float] = (0.0, -2.5)) -> None:
-        self.world = World(Scenario(robot=robot, ball=ball, poles=False), WorldParameters(), seed)
-        self.motion = Motion(MotionParameters(), self.world.robot)
+    def __init__(
+        self,
+        seed: int,
+        robot: Pose2D,
+        ball: tuple[float, float] = (0.0, -2.5),
+        parameters: MotionParameters | None = None,
+        world: WorldParameters | None = None,
+    ) -> None:
+        self.world = World(Scenario(robot=robot, ball=ball, poles=False), world or WorldParameters(), seed)
+        self.motion = Motion(parameters or MotionParameters(), self.world.robot)
         self.greatest_tilt = 0.0  # [rad]
         self.greatest_efforts = np.zeros(14)  # [N m]
         self.ball_speed = 0.0  # [m/s] greatest so far
