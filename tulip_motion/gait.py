@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,46 +95,50 @@ class MinimumJerk:
 
 
 class SwingFoot:
-    """Path of the swing foot from where it stood to a landing place that may still move."""
+    """Path of the swing foot from where it stood to a landing whose place and time may still move."""
 
     def __init__(self, start: Pose2D, duration: float, height: float, landing_speed: float) -> None:
         """Begin a swing.
 
         Args:
             start: Where the foot stands.
-            duration: Time until it lands [s].
+            duration: Time until it lands, as planned [s].
             height: Greatest height of the sole [m].
             landing_speed: Speed downwards when the ground has not come at the end [m/s].
         """
         self._axes = (MinimumJerk(start.x), MinimumJerk(start.y), MinimumJerk(start.yaw))
-        self._duration = duration
+        self._vertical = MinimumJerk(0.0)
+        self._rise_time = 0.5 * duration
         self._height = height
         self._landing_speed = landing_speed
         self._time = 0.0
 
-    def advance(self, target: Pose2D, dt: float) -> FootMotion:
-        """Advance by dt [s] and return the foot's reference."""
+    @property
+    def place(self) -> tuple[float, float]:
+        """(x, y) of the sole now, in odom [m]."""
+        return self._axes[0].position, self._axes[1].position
+
+    def advance(self, target: Pose2D, remaining: float, dt: float) -> FootMotion:
+        """Advance by dt [s] towards a target that is to be reached in `remaining` [s], and return the reference."""
         x, y, yaw = self._axes
-        remaining = self._duration - self._time
         x.advance(target.x, remaining, dt)
         y.advance(target.y, remaining, dt)
         yaw.advance(yaw.position + wrap_angle(target.yaw - yaw.position), remaining, dt)
+        z = self._vertical
+        rising = self._rise_time - self._time
+        if remaining <= dt:
+            z.position -= self._landing_speed * dt
+            z.velocity, z.acceleration = -self._landing_speed, 0.0
+        elif dt < rising < remaining:
+            z.advance(self._height, rising, dt)
+        else:
+            z.advance(0.0, remaining, dt)
         self._time += dt
-        z, dz, ddz = self._vertical()
         return FootMotion(
-            np.array([x.position, y.position, z]),
-            np.array([x.velocity, y.velocity, dz]),
-            np.array([x.acceleration, y.acceleration, ddz]),
+            np.array([x.position, y.position, z.position]),
+            np.array([x.velocity, y.velocity, z.velocity]),
+            np.array([x.acceleration, y.acceleration, z.acceleration]),
             yaw.position,
             yaw.velocity,
             yaw.acceleration,
         )
-
-    def _vertical(self) -> tuple[float, float, float]:
-        late = self._time - self._duration
-        if late > 0.0:
-            return -self._landing_speed * late, -self._landing_speed, 0.0
-        rate = 2.0 * math.pi / self._duration
-        angle = rate * self._time
-        half = 0.5 * self._height
-        return half * (1.0 - math.cos(angle)), half * rate * math.sin(angle), half * rate**2 * math.cos(angle)

@@ -13,6 +13,7 @@ from tulip_description.model import floating_model
 from tulip_description.planar import Pose2D
 from tulip_description.robot import HEAD_JOINTS, LEG_JOINTS, Robot
 from tulip_description.robot_io import JointCommand, Sensors
+from tulip_motion.course import Wish, is_at, middle
 from tulip_motion.feedforward import distance_share, feedforward
 from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import FootMotion, Reference, sole_point
@@ -31,9 +32,10 @@ from tulip_motion.joint_control import JointGains, feedback
 from tulip_motion.kick import Kick
 from tulip_motion.lipm import time_constant
 from tulip_motion.parameters import MotionParameters
+from tulip_motion.reach import reach
 from tulip_motion.stabilizer import Balance, stabilize
 from tulip_motion.state_estimator import Estimate, StateEstimator, planar_pose
-from tulip_motion.walking import Walking
+from tulip_motion.walking import Walking, must_step
 
 Array = NDArray[np.float64]
 
@@ -61,6 +63,7 @@ class Motion:
         )
         self._gains = JointGains(p)
         self._effort_limits = robot.effort_limits[:12]
+        self._reach = reach(p, robot)
         self._omega = 1.0 / time_constant(p.com_height)
         self._command = WalkCommand(0, WalkMode.STAND)
         self._mode = MotionMode.STAND
@@ -85,11 +88,20 @@ class Motion:
         """Take a new command; it holds until the next.
 
         Raises:
-            ValueError: if a velocity is not finite.
+            ValueError: if a velocity or goal is not finite.
         """
         if not all(math.isfinite(value) for value in command.velocity):
             raise ValueError(f"walk velocity is {command.velocity}; expected finite numbers")
+        goal = (command.goal.x, command.goal.y, command.goal.yaw)
+        if not all(math.isfinite(value) for value in goal):
+            raise ValueError(f"walk goal is {goal}; expected finite numbers")
         self._command = command
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What somebody should know, in words: a command that was clipped."""
+        note = self._gait.course.note if isinstance(self._gait, Walking) else ""
+        return (note,) if note else ()
 
     def start_kick(self, goal: KickGoal) -> str:
         """Begin a kick; return "" or the reason why not."""
@@ -160,6 +172,7 @@ class Motion:
             self._torques[0],
             self._torques[1],
             reason=self._reason,
+            notes=self.notes,
         )
 
     def _feet(self) -> tuple[Footstep, Footstep]:
@@ -196,17 +209,33 @@ class Motion:
                 self._steps_before += self._gait.step_count
             self._gait = None
             self._mode = MotionMode.STAND
-        elif self._mode is MotionMode.STAND and wanted is WalkMode.WALK:
-            self._gait = Walking(p, self._feet(), self._middle())
+        elif self._mode is MotionMode.STAND and self._wants_to_step(estimate):
+            self._gait = Walking(p, self._reach, self._feet(), self._middle())
             self._mode = MotionMode.WALK
+
+    def _wants_to_step(self, estimate: Estimate) -> bool:
+        """Return whether a standing robot begins to walk: when told to, or when it would fall otherwise."""
+        p, wish = self._parameters, self._wish()
+        if isinstance(wish, Pose2D):
+            away = not is_at(wish, middle(self._feet(), p.stance_width), p.goal_tolerance, p.goal_tolerance_yaw)
+        else:
+            away = wish is not None
+        dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
+        return away or must_step(p, self._feet(), (float(dcm[0]), float(dcm[1])))
+
+    def _wish(self) -> Wish:
+        """Return what the present command asks of the walk."""
+        command = self._command
+        if command.mode is WalkMode.GO:
+            return command.goal
+        return command.velocity if command.mode is WalkMode.WALK else None
 
     def _advance_gait(self, estimate: Estimate) -> Reference:
         dt = self._parameters.control_period
         dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
         if isinstance(self._gait, Walking):
-            velocity = self._command.velocity if self._command.mode is WalkMode.WALK else None
             landed = [planar_pose(sole) for sole in estimate.soles]
-            reference = self._gait.tick(dt, velocity, (dcm[0], dcm[1]), landed, estimate.loads)
+            reference = self._gait.tick(dt, self._wish(), (dcm[0], dcm[1]), landed, estimate.loads)
             self._anchor(self._gait.feet)
             return reference
         if isinstance(self._gait, Kick):

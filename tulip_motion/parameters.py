@@ -16,30 +16,42 @@ class MotionParameters:
 
     # Gait
     com_height: float = 0.71  # [m] above the ground; leaves the knees bent enough for long steps
-    step_time: float = 0.45  # [s] whole step, double support included
+    step_time: float = 0.40  # [s] whole step, double support included
     double_support_time: float = 0.06  # [s] of it the ZMP moves from the old to the new stance foot
     first_shift_time: float = 0.5  # [s] the ZMP moves over the first stance foot
     stop_shift_time: float = 0.6  # [s] the ZMP moves back between the feet after the last step
-    stance_width: float = 0.24  # [m] between the ankles; hips are 0.267 m apart
+    stance_width: float = 0.27  # [m] between the ankles; hips are 0.267 m apart
     swing_height: float = 0.045  # [m] clears 10 mm of turf and 20 mm of tracking error
     landing_speed: float = 0.15  # [m/s] the foot goes on down when the ground comes late
     zmp_forward: float = 0.040  # [m] aim point of the ZMP ahead of the ankle: the middle of the sole
     zmp_inward: float = 0.0  # [m] aim point towards the other foot
-    max_speed_forward: float = 0.6  # [m/s]
-    max_speed_backward: float = 0.25  # [m/s]
-    max_speed_sideways: float = 0.2  # [m/s]
-    max_turn_rate: float = 1.0  # [rad/s]
+    # Speeds that were walked without a fall; the reach of a step limits them as well
+    max_speed_forward: float = 0.65  # [m/s]
+    max_speed_backward: float = 0.35  # [m/s]
+    max_speed_sideways: float = 0.3  # [m/s]
+    max_turn_rate: float = 1.3  # [rad/s]
     max_speed_change: float = 0.10  # [m/s] a step; larger jumps move the DCM reference too far
     max_turn_change: float = 0.4  # [rad/s] a step
     max_heading_correction: float = 0.2  # [rad] a step; a robot that was turned by force gives way
+    closing_tolerance: float = 0.03  # [m] feet that stand side by side within this need no further step
+    closing_tolerance_yaw: float = 0.1  # [rad]
+    goal_tolerance: float = 0.015  # [m] a footstep goal is reached within this
+    goal_tolerance_yaw: float = 0.05  # [rad]
+    goal_holonomic_distance: float = 0.5  # [m] nearer, the robot goes sideways rather than turn to its goal
     min_foot_distance: float = 0.165  # [m] sideways between the ankles; soles are 0.15 m wide
-    max_foot_distance: float = 0.42  # [m] sideways between the ankles, from the reach of the hip roll
-    max_stride: float = 0.36  # [m] forward between the ankles, from the reach of the straight leg
+    reach_share: float = 0.7  # of what straight legs and the hip yaw could reach; see reach.py
     contact_force: float = 40.0  # [N] on a sole means that it carries weight
     contact_phase: float = 0.6  # of the swing; earlier contacts are stubbed toes, not landings
     late_contact_time: float = 0.10  # [s] after the planned landing the step is taken as landed
     placement_freeze_time: float = 0.08  # [s] before landing; a target that still moved would ask for endless jerk
     placement_gain: float = 1.0  # 1 puts the foot where the DCM will be
+    ankle_share: float = 0.8  # of the ZMP's range that a step may count on against a disturbance
+    step_time_weight: float = 0.003  # [m^2/s^2] landing 0.1 s early or late costs as much as 5 mm of DCM error
+    step_place_weight: float = 0.02  # [1] against the DCM error squared
+    max_step_extension: float = 0.15  # [s] a step may last longer than planned
+    max_step_time_rate: float = 5.0  # [s/s] of the landing time
+    outer_excess_weight: float = 2.0  # [1] DCM error beyond the landing foot, where no next step can catch it
+    max_swing_speed: float = 2.4  # [m/s] of the foot
 
     # Kick
     kick_shift_time: float = 0.8  # [s] the weight moves onto the stance foot
@@ -54,10 +66,10 @@ class MotionParameters:
     max_kick_direction: float = 0.5  # [rad] either side, from the reach of the hip roll
 
     # Balance
-    dcm_gain: float = 2.0  # k in zmp = ref + (1 + k) (dcm - ref)
+    dcm_gain: float = 3.0  # k in zmp = ref + (1 + k) (dcm - ref)
     zmp_limit_heel: float = 0.08  # [m] behind the aim point
     zmp_limit_toe: float = 0.09  # [m] ahead of the aim point
-    zmp_limit_side: float = 0.055  # [m] either side of the aim point
+    zmp_limit_side: float = 0.065  # [m] either side of the aim point
     observer_position_gain: float = 30.0  # [1/s]
     observer_velocity_gain: float = 60.0  # [1/s]
     height_stiffness: float = 100.0  # [1/s^2]

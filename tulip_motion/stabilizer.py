@@ -45,18 +45,33 @@ def stabilize(
     p = parameters
     gain = 1.0 + p.dcm_gain
     wanted = (zmp[0] + gain * (dcm[0] - dcm_planned[0]), zmp[1] + gain * (dcm[1] - dcm_planned[1]))
+    point, share = nearest_in_support(p, wanted, stance, other)
+    return Balance(point, share if stance.side is Side.LEFT else 1.0 - share)
+
+
+def nearest_in_support(
+    parameters: MotionParameters, point: tuple[float, float], stance: Footstep, other: Footstep | None
+) -> tuple[tuple[float, float], float]:
+    """Return the point moved into the support, and the other foot's share of the weight with the ZMP there.
+
+    Args:
+        parameters: Of motion control.
+        point: In odom [m].
+        stance: The foot that stands.
+        other: The other foot if it stands as well, else None.
+    """
+    p = parameters
     aim = sole_point(stance, p.zmp_forward, p.zmp_inward)
     share = 0.0
     if other is not None:
         aim_other = sole_point(other, p.zmp_forward, p.zmp_inward)
         dx, dy = aim_other[0] - aim[0], aim_other[1] - aim[1]
-        share = ((wanted[0] - aim[0]) * dx + (wanted[1] - aim[1]) * dy) / (dx * dx + dy * dy)
+        share = ((point[0] - aim[0]) * dx + (point[1] - aim[1]) * dy) / (dx * dx + dy * dy)
         share = min(max(share, 0.0), 1.0)
         aim = (aim[0] + share * dx, aim[1] + share * dy)
     # Both soles are the same rectangle, so their hull is that rectangle moved along the line between them.
-    forward, left = stance.pose.rotation().T @ (wanted[0] - aim[0], wanted[1] - aim[1])
+    forward, left = stance.pose.rotation().T @ (point[0] - aim[0], point[1] - aim[1])
     forward = min(max(forward, -p.zmp_limit_heel), p.zmp_limit_toe)
     left = min(max(left, -p.zmp_limit_side), p.zmp_limit_side)
     dx, dy = stance.pose.rotation() @ (forward, left)
-    right_share = share if stance.side is Side.LEFT else 1.0 - share
-    return Balance((float(aim[0] + dx), float(aim[1] + dy)), right_share)
+    return (float(aim[0] + dx), float(aim[1] + dy)), share

@@ -10,45 +10,53 @@ from __future__ import annotations
 
 import math
 
-from tulip_description.planar import Pose2D, wrap_angle
-from tulip_motion.footsteps import Footstep, plan_footsteps
+from tulip_description.planar import Pose2D
+from tulip_motion.course import Course, Wish
+from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import FootMotion, Reference, SwingFoot, sole_point, support_on
 from tulip_motion.interface import Side, Support
 from tulip_motion.lipm import DcmPlan, time_constant
 from tulip_motion.parameters import MotionParameters
-
-PREVIEW_STEPS = 3  # what lies further ahead moves the DCM by less than exp(-3 T / Tc) = 0.7 %
-
-Velocity = tuple[float, float, float]
+from tulip_motion.reach import Reach
+from tulip_motion.stabilizer import nearest_in_support
+from tulip_motion.step_adjustment import StepAdjustment
 
 
 class Walking:
     """Walks from standing to standing."""
 
-    def __init__(self, parameters: MotionParameters, feet: tuple[Footstep, Footstep], zmp: tuple[float, float]) -> None:
+    def __init__(
+        self,
+        parameters: MotionParameters,
+        reach: Reach,
+        feet: tuple[Footstep, Footstep],
+        zmp: tuple[float, float],
+    ) -> None:
         """Begin from double support.
 
         Args:
             parameters: Of motion control.
+            reach: Of the robot.
             feet: Left and right foot as they stand.
             zmp: Where the ZMP is now, in odom [m].
         """
         self._parameters = parameters
         self._time_constant = time_constant(parameters.com_height)
         self.feet = feet
-        self.velocity: Velocity = (0.0, 0.0, 0.0)
+        self.course = Course(parameters, reach)
         self.step_count = 0
         self.finished = False
         self._zmp = zmp
         self._stance: Footstep | None = None
-        self._closing = False
-        self._heading: float | None = None
         self._swing: SwingFoot | None = None
+        self._adjustments = [
+            StepAdjustment(parameters, reach, self._time_constant, -1.0 if side is Side.LEFT else 1.0) for side in Side
+        ]
 
     def tick(
         self,
         dt: float,
-        wanted: Velocity | None,
+        wish: Wish,
         dcm: tuple[float, float],
         landed: list[Pose2D],
         loads: tuple[float, float],
@@ -57,15 +65,17 @@ class Walking:
 
         Args:
             dt: [s].
-            wanted: Velocity to walk with, or None to stop.
+            wish: Velocity or goal to walk with or to, or None to stop.
             dcm: Measured DCM in odom [m].
             landed: Where the left and right sole are now, as measured, in odom; used when one touches down.
             loads: Vertical force on the left and right sole [N].
         """
         if self._stance is None:
-            self._begin_first_step(wanted or (0.0, 0.0, 0.0))
+            self._begin_first_step(wish)
         else:
             self._time += dt
+            if self._shift_time > self._parameters.double_support_time and self._must_step(dcm):
+                self._begin_step(self._far_foot(dcm), wish, self._parameters.double_support_time)
             if self._swing is not None and self._has_landed(loads):
                 side = self._stance.side.other
                 self.feet = (
@@ -73,14 +83,31 @@ class Walking:
                     if side is Side.RIGHT
                     else (Footstep(side, landed[side]), self.feet[1])
                 )
-                self._begin_step(self.feet[side], wanted, self._parameters.double_support_time)
+                if self.course.reached(wish, self.feet):
+                    self._begin_stop(self.feet[side])
+                else:
+                    self._begin_step(self.feet[side], wish, self._parameters.double_support_time)
         return self._reference(dt, dcm)
 
-    def _begin_first_step(self, wanted: Velocity) -> None:
-        leading = Side.LEFT if wanted[1] + wanted[2] >= 0.0 else Side.RIGHT
-        self._begin_step(self.feet[leading.other], wanted, self._parameters.first_shift_time)
+    def _begin_first_step(self, wish: Wish) -> None:
+        if isinstance(wish, Pose2D):
+            to_goal = self.feet[Side.LEFT].pose.inverse() @ wish
+            sideways = to_goal.y + to_goal.yaw
+        else:
+            sideways = wish[1] + wish[2] if wish else 0.0
+        leading = Side.LEFT if sideways >= 0.0 else Side.RIGHT
+        self._begin_step(self.feet[leading.other], wish, self._parameters.first_shift_time)
 
-    def _begin_step(self, stance: Footstep, wanted: Velocity | None, shift_time: float) -> None:
+    def _must_step(self, dcm: tuple[float, float]) -> bool:
+        """Return whether the DCM has left what both feet can hold, while the ZMP shifts slowly."""
+        return self._time < self._shift_time and must_step(self._parameters, self.feet, dcm)
+
+    def _far_foot(self, dcm: tuple[float, float]) -> Footstep:
+        """Return the foot that can stand while the other one steps to where the robot falls."""
+        left, right = (foot.pose.inverse().transform(dcm)[1] for foot in self.feet)
+        return self.feet[Side.LEFT] if abs(left) > abs(right) else self.feet[Side.RIGHT]
+
+    def _begin_step(self, stance: Footstep, wish: Wish, shift_time: float) -> None:
         p = self._parameters
         self._stance = stance
         self._time = 0.0
@@ -88,18 +115,12 @@ class Walking:
         self._swing = None
         self._swing_over = False
         self.step_count += 1
-        was_closing = self._closing
-        self.velocity = self._limited(wanted or (0.0, 0.0, 0.0))
-        self._closing = wanted is None and self.velocity == (0.0, 0.0, 0.0)
         aim = sole_point(stance, p.zmp_forward, p.zmp_inward)
-        if was_closing and self._closing:
-            self._begin_stop()
-            return
-        steps = plan_footsteps(self._straightened(stance), self.velocity, p.step_time, p.stance_width, PREVIEW_STEPS)
-        self._heading = steps[0].pose.yaw
+        steps = self.course.next_steps(stance, wish)
         self._target = self._nominal = steps[0].pose
         swing_time = p.step_time - p.double_support_time
-        self._landing_time = shift_time + swing_time
+        self._landing_time = self._planned_landing_time = shift_time + swing_time
+        self._aim = aim
         times, zmps = [0.0, shift_time, self._landing_time], [self._zmp, aim, aim]
         for step in steps:
             aim = sole_point(step, p.zmp_forward, p.zmp_inward)
@@ -107,39 +128,21 @@ class Walking:
             zmps += [aim, aim]
         middle = ((zmps[-1][0] + zmps[-3][0]) / 2.0, (zmps[-1][1] + zmps[-3][1]) / 2.0)
         self._plan = DcmPlan([*times, times[-1] + p.stop_shift_time], [*zmps, middle], self._time_constant)
+        _, landing_dcm = self._plan.evaluate(self._landing_time)
+        # The DCM that is wanted at landing, from the aim point.
+        self._landing_dcm = (landing_dcm[0] - self._aim[0], landing_dcm[1] - self._aim[1])
+        self._adjustment = self._adjustments[stance.side]
 
-    def _straightened(self, stance: Footstep) -> Footstep:
-        """Return the stance foot with the heading that it was meant to have.
-
-        Feet land turned by some hundredths of a radian; planned from where they look, the robot would wander off.
-        """
-        pose, most = stance.pose, self._parameters.max_heading_correction
-        if self._heading is None:
-            return stance
-        correction = min(max(wrap_angle(self._heading - pose.yaw), -most), most)
-        return Footstep(stance.side, Pose2D(pose.x, pose.y, pose.yaw + correction))
-
-    def _begin_stop(self) -> None:
+    def _begin_stop(self, stance: Footstep) -> None:
         p = self._parameters
+        self._stance = stance
+        self._time = 0.0
+        self._swing = None
         left, right = (sole_point(foot, p.zmp_forward, p.zmp_inward) for foot in self.feet)
         middle = ((left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0)
         self._shift_time = self._landing_time = p.stop_shift_time
         self._swing_over = True
         self._plan = DcmPlan([0.0, p.stop_shift_time], [self._zmp, middle], self._time_constant)
-
-    def _limited(self, wanted: Velocity) -> Velocity:
-        """Return the speed for the next step: within the robot's limits and not far from the present one."""
-        p = self._parameters
-        forward = min(max(wanted[0], -p.max_speed_backward), p.max_speed_forward)
-        left = min(max(wanted[1], -p.max_speed_sideways), p.max_speed_sideways)
-        turn = min(max(wanted[2], -p.max_turn_rate), p.max_turn_rate)
-        change, turn_change = p.max_speed_change, p.max_turn_change
-        now = self.velocity
-        return (
-            min(max(forward, now[0] - change), now[0] + change),
-            min(max(left, now[1] - change), now[1] + change),
-            min(max(turn, now[2] - turn_change), now[2] + turn_change),
-        )
 
     def _has_landed(self, loads: tuple[float, float]) -> bool:
         assert self._stance is not None
@@ -151,7 +154,7 @@ class Walking:
     def _reference(self, dt: float, dcm: tuple[float, float]) -> Reference:
         assert self._stance is not None
         p = self._parameters
-        zmp, planned = self._plan.evaluate(min(self._time, self._landing_time))
+        zmp, planned = self._planned()
         self._zmp = zmp
         stance = self._stance
         trailing = self.feet[stance.side.other]
@@ -161,13 +164,12 @@ class Walking:
             self.finished = self._swing_over and self._time > self._shift_time
         else:
             if self._swing is None:
-                duration = self._landing_time - self._shift_time
+                duration = self._landing_time - self._time
                 self._swing = SwingFoot(trailing.pose, duration, p.swing_height, p.landing_speed)
-            remaining = self._landing_time - self._time
-            if remaining > p.placement_freeze_time:
-                error = (dcm[0] - planned[0], dcm[1] - planned[1])
-                self._target = self._placed(error, remaining)
-            foot = self._swing.advance(self._target, dt)
+            if self._landing_time - self._time > p.placement_freeze_time:
+                self._adjust(dcm)
+                zmp, planned = self._planned()
+            foot = self._swing.advance(self._target, self._landing_time - self._time, dt)
             support = support_on(stance.side)
         yaw_difference = math.remainder(foot.yaw - stance.pose.yaw, 2.0 * math.pi)
         return Reference(
@@ -181,17 +183,45 @@ class Walking:
             min(self._time / self._landing_time, 1.0),
         )
 
-    def _placed(self, error: tuple[float, float], remaining: float) -> Pose2D:
-        """Return the landing place that takes up the DCM error expected at touchdown, within reach."""
-        assert self._stance is not None
-        p = self._parameters
-        shift = p.double_support_time / self._time_constant
-        # A ZMP that moves over during the double support, instead of at once, lets the error grow further.
-        gain = p.placement_gain * shift / (1.0 - math.exp(-shift)) * math.exp(remaining / self._time_constant)
-        nominal = self._nominal
-        moved = Pose2D(nominal.x + gain * error[0], nominal.y + gain * error[1], nominal.yaw)
-        beside = self._stance.pose.inverse() @ moved
-        sign = 1.0 if self._stance.side is Side.RIGHT else -1.0
-        forward = min(max(beside.x, -p.max_stride), p.max_stride)
-        left = sign * min(max(sign * beside.y, p.min_foot_distance), p.max_foot_distance)
-        return self._stance.pose @ Pose2D(forward, left, beside.yaw)
+    def _planned(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return planned ZMP and DCM at this time of the step, for the landing time that holds now."""
+        if self._swing_over or self._time < self._shift_time:
+            return self._plan.evaluate(self._time)
+        decay = math.exp(min(self._time - self._landing_time, 0.0) / self._time_constant)
+        aim, offset = self._aim, self._landing_dcm
+        return aim, (aim[0] + decay * offset[0], aim[1] + decay * offset[1])
+
+    def _adjust(self, dcm: tuple[float, float]) -> None:
+        """Move landing place and time to what the measured DCM asks for."""
+        assert self._stance is not None and self._swing is not None
+        p, pose = self._parameters, self._stance.pose
+        c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+
+        def beside(x: float, y: float) -> tuple[float, float]:
+            return c * x + s * y, c * y - s * x
+
+        foot = self._swing.place
+        landing = self._adjustment.solve(
+            beside(dcm[0] - self._aim[0], dcm[1] - self._aim[1]),
+            beside(*self._landing_dcm),
+            beside(self._nominal.x - pose.x, self._nominal.y - pose.y),
+            beside(foot[0] - pose.x, foot[1] - pose.y),
+            self._planned_landing_time - self._time,
+            self._planned_landing_time - self._time + p.max_step_extension,
+        )
+        # Estimates overshoot while the robot is being pushed: let the time follow over some ticks.
+        most = p.max_step_time_rate * p.control_period
+        change = self._time + landing.remaining - self._landing_time
+        self._landing_time += min(max(change, -most), most)
+        x, y = landing.place
+        self._target = Pose2D(pose.x + c * x - s * y, pose.y + s * x + c * y, self._nominal.yaw)
+
+
+def must_step(parameters: MotionParameters, feet: tuple[Footstep, Footstep], dcm: tuple[float, float]) -> bool:
+    """Return whether the DCM is so far from the middle between the feet that standing ankles cannot bring it back."""
+    p = parameters
+    left, right = (sole_point(foot, p.zmp_forward, p.zmp_inward) for foot in feet)
+    middle = ((left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0)
+    stretched = tuple(m + (d - m) / p.ankle_share for d, m in zip(dcm, middle, strict=True))
+    nearest, _ = nearest_in_support(p, (stretched[0], stretched[1]), feet[0], feet[1])
+    return math.hypot(stretched[0] - nearest[0], stretched[1] - nearest[1]) > 1e-9

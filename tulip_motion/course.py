@@ -1,0 +1,127 @@
+"""Where the walk goes: footsteps for a velocity command or to a goal pose, with limited speed and a held heading."""
+
+from __future__ import annotations
+
+import math
+
+from tulip_description.planar import Pose2D, wrap_angle
+from tulip_motion.footsteps import Footstep, centre_beside, foot_beside, plan_footsteps
+from tulip_motion.parameters import MotionParameters
+from tulip_motion.reach import Reach, Velocity
+
+Wish = Velocity | Pose2D | None
+"""A velocity (forward [m/s], left [m/s], turning [rad/s]), a goal for the middle between the feet in odom, or stop."""
+
+PREVIEW_STEPS = 3  # what lies further ahead moves the DCM by less than exp(-3 T / Tc) = 0.7 %
+STILL: Velocity = (0.0, 0.0, 0.0)
+
+
+class Course:
+    """Plans the next footsteps at the begin of each step."""
+
+    def __init__(self, parameters: MotionParameters, reach: Reach) -> None:
+        """Begin from rest."""
+        self._parameters = parameters
+        self._reach = reach
+        self._heading: float | None = None
+        self.velocity: Velocity = STILL
+        self.note = ""
+        """What was taken off the last command, in words, or ""."""
+
+    def next_steps(self, stance: Footstep, wish: Wish) -> list[Footstep]:
+        """Return the next footsteps, the last of which closes up so that the robot could stop there.
+
+        Args:
+            stance: The foot that stands, in odom.
+            wish: What is commanded.
+        """
+        p = self._parameters
+        straight = self._straightened(stance)
+        wanted = self._velocity_to(wish, straight) if isinstance(wish, Pose2D) else wish or STILL
+        possible, self.note = self._reach.limited(wanted)
+        if isinstance(wish, Pose2D):
+            self.note = ""  # a far goal is meant to be walked to as fast as the robot can
+        self.velocity = self._smoothed(possible)
+        steps = plan_footsteps(straight, self.velocity, p.step_time, p.stance_width, PREVIEW_STEPS)
+        if isinstance(wish, Pose2D) and self._is_near(wish, straight):
+            steps = self._last_steps(wish, straight)
+        self._heading = steps[0].pose.yaw
+        return steps
+
+    def reached(self, wish: Wish, feet: tuple[Footstep, Footstep]) -> bool:
+        """Return whether the feet stand side by side, and on the goal if there is one, so that the walk may end."""
+        p = self._parameters
+        left, right = (centre_beside(foot, p.stance_width) for foot in feet)
+        if isinstance(wish, Pose2D):
+            there = is_at(wish, middle(feet, p.stance_width), p.goal_tolerance, p.goal_tolerance_yaw)
+        else:
+            there = wish is None and self.velocity == STILL
+        return there and is_at(left, right, p.closing_tolerance, p.closing_tolerance_yaw)
+
+    def _straightened(self, stance: Footstep) -> Footstep:
+        """Return the stance foot with the heading that it was meant to have.
+
+        Feet land turned by some hundredths of a radian; planned from where they look, the robot would wander off.
+        """
+        pose, most = stance.pose, self._parameters.max_heading_correction
+        if self._heading is None:
+            return stance
+        correction = min(max(wrap_angle(self._heading - pose.yaw), -most), most)
+        return Footstep(stance.side, Pose2D(pose.x, pose.y, pose.yaw + correction))
+
+    def _smoothed(self, wanted: Velocity) -> Velocity:
+        """Return the speed for the next step: not far from the present one."""
+        p, now = self._parameters, self.velocity
+        change = (p.max_speed_change, p.max_speed_change, p.max_turn_change)
+        forward, left, turn = (
+            min(max(value, old - most), old + most) for value, old, most in zip(wanted, now, change, strict=True)
+        )
+        return forward, left, turn
+
+    def _velocity_to(self, goal: Pose2D, stance: Footstep) -> Velocity:
+        """Return the velocity towards a goal: far away facing where it goes, near by in all directions at once."""
+        p, limits = self._parameters, self._reach
+        way = centre_beside(stance, p.stance_width).inverse() @ goal
+        distance = math.hypot(way.x, way.y)
+        turn = math.atan2(way.y, way.x) if distance > p.goal_holonomic_distance else way.yaw
+        # From this speed the robot comes to rest on the way that is left, slowing down by the permitted change a step.
+        brake = math.sqrt(2.0 * p.max_speed_change / p.step_time * distance) * 0.7
+        fastest = min(limits.forward, brake)
+        if distance > p.goal_holonomic_distance:
+            return fastest * max(math.cos(turn), 0.0), 0.0, turn / (2.0 * p.step_time)
+        scale = min(fastest / distance, 1.0 / p.step_time) if distance > 0.0 else 0.0
+        return scale * way.x, scale * way.y, turn / (2.0 * p.step_time)
+
+    def _is_near(self, goal: Pose2D, stance: Footstep) -> bool:
+        """Return whether the other foot can be put on its place at the goal with the next step, slowly enough."""
+        p = self._parameters
+        to_goal = centre_beside(stance, p.stance_width).inverse() @ goal
+        foot = stance.pose.inverse() @ foot_beside(goal, stance.side.other, p.stance_width).pose
+        outward = abs(foot.y)
+        return (
+            abs(to_goal.x) <= (abs(self.velocity[0]) + p.max_speed_change) * p.step_time
+            and abs(to_goal.y) <= 2.0 * (abs(self.velocity[1]) + p.max_speed_change) * p.step_time
+            and abs(to_goal.yaw) <= p.max_turn_change * p.step_time
+            and self._reach.nearest <= outward <= self._reach.farthest
+            and (foot.y > 0.0) is (stance.side.other.value == 0)
+        )
+
+    def _last_steps(self, goal: Pose2D, stance: Footstep) -> list[Footstep]:
+        """Return the steps that put both feet on the goal."""
+        first, second = (
+            foot_beside(goal, side, self._parameters.stance_width) for side in (stance.side.other, stance.side)
+        )
+        self.velocity = STILL
+        return [first, second, first, second]
+
+
+def is_at(goal: Pose2D, pose: Pose2D, tolerance: float, tolerance_yaw: float) -> bool:
+    """Return whether a pose lies within tolerances [m], [rad] of a goal."""
+    away = goal.inverse() @ pose
+    return math.hypot(away.x, away.y) <= tolerance and abs(away.yaw) <= tolerance_yaw
+
+
+def middle(feet: tuple[Footstep, Footstep], stance_width: float) -> Pose2D:
+    """Return the pose midway between the left and the right foot, in odom."""
+    left, right = (centre_beside(foot, stance_width) for foot in feet)
+    return Pose2D(0.5 * (left.x + right.x), 0.5 * (left.y + right.y), left.yaw + 0.5 * wrap_angle(right.yaw - left.yaw))
