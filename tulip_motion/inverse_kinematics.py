@@ -12,12 +12,14 @@ of its points is meant, so what the stance sole's rest makes of the base is one 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.linalg.blas import dsyrk
 from scipy.linalg.lapack import dpotrf, dpotrs
 
 from tulip_description import frames
@@ -26,9 +28,12 @@ from tulip_motion.gait import FootMotion
 from tulip_motion.interface import Side
 
 Array = NDArray[np.float64]
+Rows = Sequence[Sequence[float]]
+"""A 3 x 3 matrix by rows, in plain numbers."""
 
 MAX_POSITION_ERROR = 0.1  # [m] feedback acts on no more: a target that jumps is approached, not leapt at
 MAX_ORIENTATION_ERROR = 1.0  # [rad] likewise; eq. (11) has no inverse at pi / 2
+TWICE_LEAST_COSINE = 2.0 * math.cos(MAX_ORIENTATION_ERROR)
 SINGULAR_VALUE = 0.03  # of J, below which damping grows; walking at 0.6 m/s stays above 0.048, a kick above 0.040
 REPORTED_POSITION_ERROR = 0.03  # [m] walking stays below 0.005, so more means that the target is out of reach
 REPORTED_ORIENTATION_ERROR = 0.15  # [rad]
@@ -85,7 +90,7 @@ def error_rate_matrix(desired: Array, actual: Array) -> Array:
     return matrix
 
 
-def angular_rate(desired: Array, actual: Array, angular_velocity: Array, gain: float) -> tuple[float, float, float]:
+def angular_rate(turn: Rows, angular_velocity: Sequence[float], gain: float) -> tuple[float, float, float]:
     """Return L^-1 (L^T w_d + K_o e_o) [rad/s], the orientation rows of eq. (10), in odom axes.
 
     No matrix has to be inverted. Q = R_e R_d^T is a rotation by some angle theta, and its characteristic polynomial
@@ -93,25 +98,34 @@ def angular_rate(desired: Array, actual: Array, angular_velocity: Array, gain: f
     Q leaves its axis e_o where it is, L^-1 e_o = 2 e_o / (t - 1), which is tan(theta) about that axis.
 
     Args:
-        desired: (3, 3) R_d.
-        actual: (3, 3) R_e.
-        angular_velocity: (3,) w_d [rad/s], odom axes.
+        turn: 3 x 3 Q, by rows.
+        angular_velocity: 3 of w_d [rad/s], odom axes.
         gain: K_o [1/s].
     """
-    turn = actual.dot(desired.T)
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = turn.tolist()
-    wx, wy, wz = angular_velocity.tolist()
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = turn
+    wx, wy, wz = angular_velocity
     twice_cosine = xx + yy + zz - 1.0
-    if twice_cosine > 2.0 * math.cos(MAX_ORIENTATION_ERROR):
+    if twice_cosine > TWICE_LEAST_COSINE:
         k = gain / twice_cosine
         ex, ey, ez = k * (yz - zy), k * (zx - xz), k * (xy - yx)
     else:
-        axis = pin.log3(turn.T)
+        axis = pin.log3(np.array(turn).T)
         ex, ey, ez = (gain * math.tan(MAX_ORIENTATION_ERROR) / np.linalg.norm(axis) * axis).tolist()
     return (
         ex + xx * wx + xy * wy + xz * wz,
         ey + yx * wx + yy * wy + yz * wz,
         ez + zx * wx + zy * wy + zz * wz,
+    )
+
+
+def turn_from_yaw(yaw: float, actual: Array) -> Rows:
+    """Return Q = R_e R_d^T by rows for an R_d that turns about z alone."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = actual.tolist()
+    return (
+        (xx * c - xy * s, xx * s + xy * c, xz),
+        (yx * c - yy * s, yx * s + yy * c, yz),
+        (zx * c - zy * s, zx * s + zy * c, zz),
     )
 
 
@@ -169,16 +183,18 @@ class InverseKinematics:
         self._gain_position = gain_position
         self._gain_orientation = gain_orientation
         self._damping = damping
+        self._damping_matrix = np.asfortranarray(damping * np.eye(12))
         self._joint_limits = joint_limits
         self._per_speed_limit = 1.0 / model.velocityLimit[6:]
         self.configuration = pin.neutral(model)
         """(19,) desired base pose and joint angles q_d."""
         self.velocity = np.zeros(model.nv)
         """(18,) desired base and joint velocities."""
+        self._base_velocity, self._joint_velocity = self.velocity[:6], self.velocity[6:]
         self._stance = Side.LEFT
         # Views into Pinocchio's data: each is made once, since making one takes longer than most of what is done
         # with it. They show the posture that `update_jacobian` saw.
-        self._com = data.com[0]
+        self._com, self._com_drift = data.com[0], data.acom[0]
         self._base = data.oMi[1]
         self._base_rotation = self._base.rotation
         self._soles = tuple(data.oMf[frame] for frame in self.sole_frames)
@@ -196,8 +212,9 @@ class InverseKinematics:
         self._stance_levers = (self._task_of_stance[3:, :3], self._task_of_stance[3:, 6:9])
         self._other_lever = self._task_of_other[3:, 6:9]
         self._jacobian_transposed = np.zeros((12, 12))
-        self._normal = np.zeros((12, 12))
-        self._normal_diagonal = self._normal.reshape(-1)[::13]
+        self._jacobian = self._jacobian_transposed.T
+        self._leg_rows = (self._jacobian_transposed[:6], self._jacobian_transposed[6:])
+        self._com_rows = self._jacobian_transposed[:, :3]
         self._factor = np.eye(12)
         self.twist_to_base = np.eye(6)
         """(6, 6) from a twist about odom's origin to the base's velocity in its own axes."""
@@ -219,7 +236,7 @@ class InverseKinematics:
     @property
     def jacobian(self) -> Array:
         """(12, 12) J of eq. (5), for the posture that `update_jacobian` saw."""
-        return self._jacobian_transposed.T.copy()
+        return self._jacobian.copy()
 
     @property
     def sole_jacobians(self) -> tuple[Array, Array]:
@@ -238,7 +255,7 @@ class InverseKinematics:
     @property
     def joint_velocities(self) -> Array:
         """(12,) dq_d/dt [rad/s]."""
-        return self.velocity[6:]
+        return self._joint_velocity
 
     @property
     def singular_value(self) -> float:
@@ -279,12 +296,10 @@ class InverseKinematics:
         for frame in self.sole_frames:
             pin.updateFramePlacement(model, data, frame)
         self._update_levers()
-        other = stance.other
-        jacobian = self._jacobian_transposed
-        twists, columns = self.leg_twists, LEG_COLUMNS
-        np.dot(twists[stance].T, self._task_of_stance, out=jacobian[columns[stance]])
-        np.dot(twists[other].T, self._task_of_other, out=jacobian[columns[other]])
-        jacobian[:, :3] += self._com_of_joints
+        other, twists, rows = stance.other, self.leg_twists, self._leg_rows
+        np.dot(twists[stance].T, self._task_of_stance, out=rows[stance])
+        np.dot(twists[other].T, self._task_of_other, out=rows[other])
+        np.add(self._com_rows, self._com_of_joints, out=self._com_rows)
         self.twist_to_base = self._base.toActionMatrixInverse()
         self._base_of_stance = self.twist_to_base.dot(twists[stance])
         self._factorize()
@@ -296,9 +311,11 @@ class InverseKinematics:
         k_p, k_o = self._gain_position, self._gain_orientation
         self._rate[:] = (
             *linear_rate(target.com, self._com, target.com_velocity, k_p),
-            *angular_rate(target.torso_rotation, self._base_rotation, target.torso_angular_velocity, k_o),
+            *angular_rate(
+                self._base_rotation.dot(target.torso_rotation.T).tolist(), target.torso_angular_velocity.tolist(), k_o
+            ),
             *linear_rate(foot.position, self.sole_positions[other], foot.velocity, k_p),
-            *angular_rate(rotation_z(foot.yaw), self._sole_rotations[other], np.array((0.0, 0.0, foot.yaw_rate)), k_o),
+            *angular_rate(turn_from_yaw(foot.yaw, self._sole_rotations[other]), (0.0, 0.0, foot.yaw_rate), k_o),
         )
         joints = self._damped_solve(self._rate)
         fastest = max(map(abs, (joints * self._per_speed_limit).tolist()))
@@ -319,7 +336,7 @@ class InverseKinematics:
         foot_drift = pin.getFrameClassicalAcceleration(model, data, frames_[stance.other], pin.LOCAL_WORLD_ALIGNED)
         # The base makes up for the drift of the stance sole, and takes the task along.
         wanted = task_acceleration - self._task_of_stance.T.dot(stance_drift)
-        wanted[:3] -= data.acom[0]
+        wanted[:3] -= self._com_drift
         wanted[6:] -= foot_drift.vector
         generalized = np.empty(18)
         joints = generalized[6:] = self._damped_solve(wanted)
@@ -339,15 +356,14 @@ class InverseKinematics:
         q = self.configuration
         q[:7] = pin.SE3ToXYZQUAT(self._anchor * self._soles[self._stance].actInv(self._base))
         q = self.configuration = pin.integrate(self.model, q, self.velocity * dt)
-        wanted = q[7:].tolist()
         joints = q[7:]
+        wanted = joints.tolist()
         # Two ufuncs: numpy's clip takes four times as long.
         np.minimum(joints, self._joint_limits[1], out=joints)
         np.maximum(joints, self._joint_limits[0], out=joints)
         if joints.tolist() != wanted:
-            velocities = self.velocity[6:].copy()
-            velocities[joints != wanted] = 0.0
-            self._set_joint_velocities(velocities)
+            # A joint that is at its end rests there.
+            self._set_joint_velocities(np.where(joints == wanted, self._joint_velocity, 0.0))
 
     def _update_levers(self) -> None:
         """Enter where CoM and other foot lie: a point r of a body with twist (v, w) moves with v - S(r) w."""
@@ -363,11 +379,8 @@ class InverseKinematics:
         One inverse iteration a tick, begun from the last tick's result, keeps `_weakest` on the direction of joint
         space that moves the task least, and gives its singular value (Maciejewski and Klein, 1988).
         """
-        np.dot(self._jacobian_transposed, self._jacobian_transposed.T, out=self._normal)
-        diagonal = self._normal_diagonal
-        np.add(diagonal, self._damping, out=diagonal)
-        # LAPACK without scipy's checks, which cost more than the factorization. Damped, it cannot fail.
-        self._factor, _ = dpotrf(self._normal)
+        # BLAS and LAPACK without scipy's checks, which cost more than the work. Damped, it cannot fail.
+        self._factor, _ = dpotrf(dsyrk(1.0, self._jacobian, beta=1.0, c=self._damping_matrix, trans=1), clean=0)
         grown = dpotrs(self._factor, self._weakest)[0]
         growth = math.sqrt(grown.dot(grown))
         np.multiply(grown, 1.0 / growth, out=self._weakest)
@@ -375,8 +388,8 @@ class InverseKinematics:
         self._singular_value = math.sqrt(square)
         if self._singular_value < SINGULAR_VALUE:
             # From nothing at the threshold to SINGULAR_VALUE^2 where the direction is lost.
-            np.add(diagonal, SINGULAR_VALUE**2 - square, out=diagonal)
-            self._factor, _ = dpotrf(self._normal)
+            damping = (self._damping + SINGULAR_VALUE**2 - square) * np.eye(12)
+            self._factor, _ = dpotrf(dsyrk(1.0, self._jacobian, beta=1.0, c=damping, trans=1), clean=0)
 
     def _damped_solve(self, rate: Array) -> Array:
         solution: Array = dpotrs(self._factor, self._jacobian_transposed.dot(rate))[0]
@@ -384,5 +397,5 @@ class InverseKinematics:
 
     def _set_joint_velocities(self, joints: Array) -> None:
         """Set the joints' speeds and the base's that leaves the stance sole at rest."""
-        self.velocity[6:] = joints
-        np.negative(self._base_of_stance.dot(joints[LEG_COLUMNS[self._stance]]), out=self.velocity[:6])
+        self._joint_velocity[:] = joints
+        np.negative(self._base_of_stance.dot(joints[LEG_COLUMNS[self._stance]]), out=self._base_velocity)

@@ -24,6 +24,7 @@ from tulip_motion.parameters import MotionParameters
 Array = NDArray[np.float64]
 Quaternion = tuple[float, float, float, float]
 """x, y, z, w; of unit length."""
+Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ class StateEstimator:
         self._model = model
         data = self._data = model.createData()
         self._soles = (model.getFrameId(frames.LEFT_SOLE), model.getFrameId(frames.RIGHT_SOLE))
-        self._cells: list[list[tuple[float, float]]] = cell_positions.tolist()
+        self._cells = cell_positions
         self._imu_rotation = imu_rotation
         self._imu_to_base = quaternion_conjugate(tuple(pin.Quaternion(imu_rotation).coeffs().tolist()))
         self._configuration = pin.neutral(model)
@@ -81,11 +82,10 @@ class StateEstimator:
         # Views into Pinocchio's data, made once: making one takes as long as what is done with it.
         self._model_com, self._model_com_velocity = data.com[0], data.vcom[0]
         self._base_rotation = data.oMi[1].rotation
-        self._placements = tuple((data.oMf[i].rotation, data.oMf[i].translation) for i in self._soles)
-        self._identities = np.stack([np.eye(4), np.eye(4)])
+        self._sole_positions = tuple(data.oMf[i].translation for i in self._soles)
         self._heading_offset: float | None = None
-        self._com: Array | None = None
-        self._com_velocity = np.zeros(3)
+        self._com: list[float] | None = None
+        self._com_velocity = [0.0, 0.0, 0.0]
         self.anchors: list[Pose2D] = [Pose2D(), Pose2D()]
 
     def anchor(self, foot: Footstep) -> None:
@@ -112,31 +112,32 @@ class StateEstimator:
         model, data = self._model, self._data
         # The base stays at the origin and at rest: where it is and how it moves follows from the feet.
         pin.centerOfMass(model, data, q, v, False)
-        soles = self._identities.copy()
-        for side, (turn, place) in enumerate(self._placements):
-            pin.updateFramePlacement(model, data, self._soles[side])
-            soles[side, :3, :3] = turn
-            soles[side, :3, 3] = place
+        soles = np.empty((2, 4, 4))
+        for side, frame in enumerate(self._soles):
+            soles[side] = pin.updateFramePlacement(model, data, frame).homogeneous
         if self._com is None:
             self._begin(soles)
         position, velocity = self._from_feet(left_weight)
-        soles[:, :3, 3] += position
+        x, y, z = position
+        for sole, place in zip(soles, self._sole_positions, strict=True):
+            px, py, pz = place.tolist()
+            sole[:3, 3] = (px + x, py + y, pz + z)
         rotation = self._base_rotation.copy()
-        self._observe(self._model_com + position, self._model_com_velocity + velocity, acceleration)
-        assert self._com is not None
-        cells: list[list[float]] = sensors.foot_cells.tolist()
+        com, com_velocity = self._observe(position, velocity, acceleration)
+        cells = sensors.foot_cells
+        loads = (sum(cells[0].tolist()), sum(cells[1].tolist()))
         return Estimate(
-            position,
+            np.array(position),
             rotation,
-            velocity,
+            np.array(velocity),
             rotation.dot(v[3:6]),
             q[7:].copy(),
             v[6:].copy(),
-            self._com.copy(),
-            self._com_velocity.copy(),
+            com,
+            com_velocity,
             soles,
-            self._centre_of_pressure(cells, soles),
-            (sum(cells[0]), sum(cells[1])),
+            self._centre_of_pressure(cells, soles, loads),
+            loads,
             math.acos(min(max(rotation[2, 2], -1.0), 1.0)),
         )
 
@@ -148,13 +149,13 @@ class StateEstimator:
         half = 0.5 * self._heading_offset
         return quaternion_product((0.0, 0.0, math.sin(half), math.cos(half)), attitude)
 
-    def _from_feet(self, left_weight: float) -> tuple[Array, Array]:
+    def _from_feet(self, left_weight: float) -> tuple[Point, Point]:
         """Return position [m] and velocity [m/s] of the base that leave the feet that carry where they stand."""
         x = y = z = vx = vy = vz = 0.0
         for side, weight in ((Side.LEFT, left_weight), (Side.RIGHT, 1.0 - left_weight)):
             if weight > 0.0:
                 anchor = self.anchors[side]
-                px, py, pz = self._placements[side][1].tolist()
+                px, py, pz = self._sole_positions[side].tolist()
                 x += weight * (anchor.x - px)
                 y += weight * (anchor.y - py)
                 z -= weight * pz
@@ -163,7 +164,7 @@ class StateEstimator:
                 vx -= weight * wx
                 vy -= weight * wy
                 vz -= weight * wz
-        return np.array((x, y, z)), np.array((vx, vy, vz))
+        return (x, y, z), (vx, vy, vz)
 
     def _begin(self, soles: Array) -> None:
         """Set the anchors such that the left foot stays where it was believed to be, the right beside it."""
@@ -174,26 +175,46 @@ class StateEstimator:
             keep = left
         self.anchors = [Pose2D(keep.x, keep.y, left.yaw), keep_distance(keep, left, right)]
 
-    def _observe(self, com: Array, velocity: Array, acceleration: Array) -> None:
-        """Predict the CoM with the commanded acceleration and pull it to the measured one."""
-        if self._com is None:
-            self._com, self._com_velocity = com.copy(), np.zeros(3)
-            return
-        p, dt = self._parameters, self._parameters.control_period
-        self._com += dt * (self._com_velocity + p.observer_position_gain * (com - self._com))
-        self._com_velocity += dt * (acceleration + p.observer_velocity_gain * (velocity - self._com_velocity))
+    def _observe(self, position: Point, velocity: Point, acceleration: Array) -> tuple[Array, Array]:
+        """Predict the CoM with the commanded acceleration and pull it to the measured one; return its state.
 
-    def _centre_of_pressure(self, cells: list[list[float]], soles: Array) -> Array:
+        Args:
+            position: Of the base [m]; the model's CoM counts from there.
+            velocity: Of the base [m/s].
+            acceleration: (3,) of the CoM, as commanded [m/s^2].
+        """
+        p, dt = self._parameters, self._parameters.control_period
+        measured = [c + base for c, base in zip(self._model_com.tolist(), position, strict=True)]
+        if self._com is None:
+            self._com, self._com_velocity = measured, [0.0, 0.0, 0.0]
+        else:
+            k_p, k_v = p.observer_position_gain, p.observer_velocity_gain
+            for i, (c, v, a, m, mv, base) in enumerate(
+                zip(
+                    self._com,
+                    self._com_velocity,
+                    acceleration.tolist(),
+                    measured,
+                    self._model_com_velocity.tolist(),
+                    velocity,
+                    strict=True,
+                )
+            ):
+                self._com[i] = c + dt * (v + k_p * (m - c))
+                self._com_velocity[i] = v + dt * (a + k_v * (mv + base - v))
+        return np.array(self._com), np.array(self._com_velocity)
+
+    def _centre_of_pressure(self, cells: Array, soles: Array, loads: tuple[float, float]) -> Array:
         """Return where the cells' forces act together, seen from above."""
-        total = sum(cells[0]) + sum(cells[1])
+        total = loads[0] + loads[1]
         if total < self._parameters.contact_force:
             return np.full(2, np.nan)
         x = y = 0.0
-        for forces, points, sole in zip(cells, self._cells, soles[:, :2].tolist(), strict=True):
+        for force, points, sole, load in zip(cells, self._cells, soles[:, :2].tolist(), loads, strict=True):
+            forward, left = force.dot(points).tolist()  # load times the place in the sole
             (xx, xy, _, px), (yx, yy, _, py) = sole
-            for force, (forward, left) in zip(forces, points, strict=True):
-                x += force * (px + xx * forward + xy * left)
-                y += force * (py + yx * forward + yy * left)
+            x += load * px + xx * forward + xy * left
+            y += load * py + yx * forward + yy * left
         return np.array((x / total, y / total))
 
 

@@ -25,6 +25,7 @@ from tulip_motion.inverse_kinematics import (
     orientation_error,
     rotation_z,
     skew,
+    turn_from_yaw,
 )
 from tulip_motion.motion import with_fixed_head
 
@@ -128,7 +129,7 @@ def test_orientation_rows_of_eq_10_are_what_inverting_l_gives(
     assume(np.linalg.norm(pin.log3(desired @ actual.T)) < 0.99 * MAX_ORIENTATION_ERROR)
     matrix, error = error_rate_matrix(desired, actual), orientation_error(desired, actual)
     expected = np.linalg.solve(matrix, matrix.T @ wanted + 20.0 * error)
-    np.testing.assert_allclose(angular_rate(desired, actual, np.array(wanted), 20.0), expected, atol=1e-11)
+    np.testing.assert_allclose(angular_rate((actual @ desired.T).tolist(), wanted, 20.0), expected, atol=1e-11)
 
 
 @given(small_turns, small_turns, rates, rates)
@@ -145,10 +146,16 @@ def test_l_is_the_rate_of_the_orientation_error(
     np.testing.assert_allclose((after - before) / h, matrix.T @ w_d - matrix @ w_e, atol=1e-7)  # h^2 w^3
 
 
+@given(st.floats(-4.0, 4.0), small_turns)
+def test_turn_from_yaw_is_the_product_of_the_rotations(yaw: float, turn: tuple[float, float, float]) -> None:
+    actual = pin.exp3(np.array(turn))
+    np.testing.assert_allclose(turn_from_yaw(yaw, actual), actual @ rotation_z(yaw).T, atol=1e-15)
+
+
 @given(st.floats(1.01, np.pi - 1e-6), rates.filter(lambda axis: np.linalg.norm(axis) > 0.1))
 def test_orientation_feedback_is_bounded_and_turns_the_shorter_way(angle: float, axis: list[float]) -> None:
     direction = np.array(axis) / np.linalg.norm(axis)
-    rate = np.array(angular_rate(pin.exp3(angle * direction), np.eye(3), np.zeros(3), 20.0))
+    rate = np.array(angular_rate(pin.exp3(-angle * direction).tolist(), (0.0, 0.0, 0.0), 20.0))
     np.testing.assert_allclose(rate, 20.0 * np.tan(MAX_ORIENTATION_ERROR) * direction, atol=1e-4)  # log3 near pi
 
 
