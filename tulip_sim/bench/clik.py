@@ -195,7 +195,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
         bars = axis.barh(list(values), list(values.values()), color="tab:blue")
         axis.bar_label(bars, fmt=" %.1f")
         axis.invert_yaxis()
-        axis.margins(x=0.15)
+        axis.set_xlim(0.0, 1.2 * max(values.values()))  # room for the figures
         axis.set(title=title, xlabel="median [us]")
     figure.savefig(path, dpi=120)
 
