@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 import _environment
 
 if __name__ == "__main__":
-    _environment.prepare()
+    _environment.prepare(("bench",) if "clik" in sys.argv else ())  # Pink, which only that bench needs
 
 import json
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -18,10 +19,10 @@ from rich.markdown import Markdown
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
-from tulip_sim.bench import kick, trial, walk
+from tulip_sim.bench import clik, kick, trial, walk
 from tulip_sim.bench.runner import Row, run, save, write_results
 
-BENCHES = {module.BENCH.name: module.BENCH for module in (trial, walk, kick)}
+BENCHES = {module.BENCH.name: module.BENCH for module in (trial, walk, kick, clik)}
 DOCS = _environment.ROOT / "docs"
 
 
@@ -40,6 +41,12 @@ def main(
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from None
     bench, console = BENCHES[name], Console()
+    if bench.prepare is not None:
+        try:
+            bench.prepare(console.print)
+        except RuntimeError as error:
+            print(f"error: {error}", file=sys.stderr)
+            raise typer.Exit(EXIT_BAD_INPUT) from None
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console) as bar:
         task = bar.add_task(name, total=len(bench.trials))
@@ -50,6 +57,8 @@ def main(
 
         rows = run(bench, workers, done)
     save(bench, rows, DOCS / "results")
+    if bench.draw is not None:
+        bench.draw(rows, DOCS / "results" / f"{bench.name}.png")
     write_results(list(BENCHES.values()), DOCS / "results", DOCS / "results.md")
     if json_path is not None:
         json_path.write_text(json.dumps(rows, indent=1) + "\n")

@@ -4,23 +4,41 @@ Twelve task velocities, the CoM's (3), the torso's (3, angular) and the other fo
 angular), all relative to the stance foot, against twelve joint velocities. The body is modelled with a
 free flyer whose motion the fixed stance sole determines, so the 12 x 12 Jacobian of eq. (5) is that of
 the joints plus that of the base through the stance leg.
+
+All of it is written with twists about odom's origin (linear part first): there a rigid body has one twist whichever
+of its points is meant, so what the stance sole's rest makes of the base is one subtraction, with no change of frame.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.linalg.blas import dsyrk
 from scipy.linalg.lapack import dpotrf, dpotrs
 
 from tulip_description import frames
+from tulip_description.planar import Pose2D
 from tulip_motion.gait import FootMotion
 from tulip_motion.interface import Side
 
 Array = NDArray[np.float64]
+Rows = Sequence[Sequence[float]]
+"""A 3 x 3 matrix by rows, in plain numbers."""
+
+MAX_POSITION_ERROR = 0.1  # [m] feedback acts on no more: a target that jumps is approached, not leapt at
+MAX_ORIENTATION_ERROR = 1.0  # [rad] likewise; eq. (11) has no inverse at pi / 2
+TWICE_LEAST_COSINE = 2.0 * math.cos(MAX_ORIENTATION_ERROR)
+SINGULAR_VALUE = 0.03  # of J, below which damping grows; walking at 0.6 m/s stays above 0.048, a kick above 0.040
+REPORTED_POSITION_ERROR = 0.03  # [m] walking stays below 0.005, so more means that the target is out of reach
+REPORTED_ORIENTATION_ERROR = 0.15  # [rad]
+LEG_COLUMNS = (slice(0, 6), slice(6, 12))
+"""Where the left and the right leg's joints stand among the twelve."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +61,8 @@ class TaskTarget:
 
 def rotation_z(yaw: float) -> Array:
     """Return the (3, 3) rotation about z."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
 
 
 def skew(vector: Array) -> Array:
@@ -58,51 +76,94 @@ def orientation_error(desired: Array, actual: Array) -> Array:
 
     The sum of the cross products of matching columns is the vee of R_d R_e^T minus its transpose.
     """
-    product = desired @ actual.T
-    return 0.5 * np.array([product[2, 1] - product[1, 2], product[0, 2] - product[2, 0], product[1, 0] - product[0, 1]])
+    (_, xy, xz), (yx, _, yz), (zx, zy, _) = desired.dot(actual.T).tolist()
+    return np.array((0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy)))
 
 
 def error_rate_matrix(desired: Array, actual: Array) -> Array:
     """Return L = -1/2 sum of S(desired column) S(actual column), eq. (11), (3, 3).
 
-    From S(a) S(b) = b a^T - (a . b) I, the sum is 1/2 (trace(R_d^T R_e) I - R_e R_d^T).
+    From S(a) S(b) = b a^T - (a . b) I, the sum is 1/2 (trace(Q) I - Q) with Q = R_e R_d^T.
     """
-    matrix: Array = -0.5 * (actual @ desired.T)
-    matrix.flat[::4] += 0.5 * float(np.vdot(desired, actual))
+    turn = actual @ desired.T
+    matrix: Array = 0.5 * (np.trace(turn) * np.eye(3) - turn)
     return matrix
 
 
-def solve_3(matrix: Array, right: Array) -> Array:
-    """Solve a 3 x 3 system by Cramer's rule: a tenth of the time of numpy's general solver."""
-    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
-    x, y, z = right.tolist()
-    ei_fh, di_fg, dh_eg = e * i - f * h, d * i - f * g, d * h - e * g
-    yi_fz, dz_yg, ez_yh = y * i - f * z, d * z - y * g, e * z - y * h
-    scale = 1.0 / (a * ei_fh - b * di_fg + c * dh_eg)
-    return np.array(
-        [
-            scale * (x * ei_fh - b * yi_fz - c * ez_yh),
-            scale * (a * yi_fz - x * di_fg + c * dz_yg),
-            scale * (a * ez_yh - b * dz_yg + x * dh_eg),
-        ]
+def angular_rate(turn: Rows, angular_velocity: Sequence[float], gain: float) -> tuple[float, float, float]:
+    """Return L^-1 (L^T w_d + K_o e_o) [rad/s], the orientation rows of eq. (10), in odom axes.
+
+    No matrix has to be inverted. Q = R_e R_d^T is a rotation by some angle theta, and its characteristic polynomial
+    Q^3 - t Q^2 + t Q - I = 0, t = trace(Q), gives L^-1 = 2 (Q^2 + t I) / (t^2 - 1). With that L^-1 L^T = Q, and since
+    Q leaves its axis e_o where it is, L^-1 e_o = 2 e_o / (t - 1), which is tan(theta) about that axis.
+
+    Args:
+        turn: 3 x 3 Q, by rows.
+        angular_velocity: 3 of w_d [rad/s], odom axes.
+        gain: K_o [1/s].
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = turn
+    wx, wy, wz = angular_velocity
+    twice_cosine = xx + yy + zz - 1.0
+    if twice_cosine > TWICE_LEAST_COSINE:
+        k = gain / twice_cosine
+        ex, ey, ez = k * (yz - zy), k * (zx - xz), k * (xy - yx)
+    else:
+        axis = pin.log3(np.array(turn).T)
+        ex, ey, ez = (gain * math.tan(MAX_ORIENTATION_ERROR) / np.linalg.norm(axis) * axis).tolist()
+    return (
+        ex + xx * wx + xy * wy + xz * wz,
+        ey + yx * wx + yy * wy + yz * wz,
+        ez + zx * wx + zy * wy + zz * wz,
     )
 
 
-def inverse_of_base_jacobian(jacobian: Array) -> Array:
-    """Return the inverse of the first six columns of a frame's (6, 18) Jacobian in odom axes.
+def turn_from_yaw(yaw: float, actual: Array) -> Rows:
+    """Return Q = R_e R_d^T by rows for an R_d that turns about z alone."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = actual.tolist()
+    return (
+        (xx * c - xy * s, xx * s + xy * c, xz),
+        (yx * c - yy * s, yx * s + yy * c, yz),
+        (zx * c - zy * s, zx * s + zy * c, zz),
+    )
 
-    They are [[R, -S(r) R], [0, R]] with the base's rotation R and the frame's place r from the base, whose inverse
-    is [[R^T, R^T S(r)], [0, R^T]].
-    """
-    turn = jacobian[3:6, 3:6].T
-    inverse = np.zeros((6, 6))
-    inverse[:3, :3] = inverse[3:, 3:] = turn
-    inverse[:3, 3:] = -turn @ jacobian[:3, 3:6] @ turn
-    return inverse
+
+def linear_rate(desired: Array, actual: Array, velocity: Array, gain: float) -> tuple[float, float, float]:
+    """Return p_d' + K_p e_p [m/s], the position rows of eq. (10), with e_p no longer than `MAX_POSITION_ERROR`."""
+    ex, ey, ez = np.subtract(desired, actual).tolist()
+    vx, vy, vz = velocity.tolist()
+    square = ex * ex + ey * ey + ez * ez
+    if square > MAX_POSITION_ERROR**2:
+        gain *= MAX_POSITION_ERROR / math.sqrt(square)
+    return vx + gain * ex, vy + gain * ey, vz + gain * ez
+
+
+def _distance(a: Array, b: Array) -> float:
+    return float(np.linalg.norm(a - b))
+
+
+def _angle(a: Array, b: Array) -> float:
+    return float(np.linalg.norm(pin.log3(a @ b.T)))
+
+
+def _set_lever(block: Array, sign: float, point: Array) -> None:
+    """Write sign * S(point) into a (3, 3) block whose diagonal is zero."""
+    x, y, z = point.tolist()
+    block[0, 1] = -sign * z
+    block[0, 2] = sign * y
+    block[1, 0] = sign * z
+    block[1, 2] = -sign * x
+    block[2, 0] = -sign * y
+    block[2, 1] = sign * x
 
 
 class InverseKinematics:
-    """Integrates desired joint angles that follow a task target without drift, eqs. (7) and (10)."""
+    """Integrates desired joint angles that follow a task target without drift, eqs. (7) and (10).
+
+    Targets that cannot be reached are safe: errors count up to a limit, damping grows as a posture becomes singular,
+    joint speeds keep to the robot's limits, and `notes` says what is the matter.
+    """
 
     def __init__(
         self, model: Any, gain_position: float, gain_orientation: float, damping: float, joint_limits: Array
@@ -110,32 +171,60 @@ class InverseKinematics:
         """Make a solver.
 
         Args:
-            model: Pinocchio model of the legs with a free flyer at base_link.
+            model: Pinocchio model of the legs with a free flyer at base_link; its speed limits are kept to.
             gain_position: K_p of eq. (10) [1/s].
             gain_orientation: K_o of eq. (10) [1/s].
-            damping: Added to the diagonal of J^T J, so that singular postures stay finite.
+            damping: Added to the diagonal of J^T J, always; near singular postures more is added.
             joint_limits: (2, 12) lowest and highest joint angles [rad].
         """
         self.model = model
-        self.data = model.createData()
+        data = self.data = model.createData()
         self.sole_frames = (model.getFrameId(frames.LEFT_SOLE), model.getFrameId(frames.RIGHT_SOLE))
         self._gain_position = gain_position
         self._gain_orientation = gain_orientation
-        self._damping = damping * np.eye(12)
+        self._damping = damping
+        self._damping_matrix = np.asfortranarray(damping * np.eye(12))
         self._joint_limits = joint_limits
+        self._per_speed_limit = 1.0 / model.velocityLimit[6:]
         self.configuration = pin.neutral(model)
         """(19,) desired base pose and joint angles q_d."""
         self.velocity = np.zeros(model.nv)
         """(18,) desired base and joint velocities."""
-        self.sole_jacobians: tuple[Array, Array] = (np.zeros((6, 18)), np.zeros((6, 18)))
-        """(6, 18) each, odom axes, at `configuration`."""
-        self.jacobian = np.zeros((12, 12))
-        """J of eq. (5) at `configuration`."""
-        self._task_of_base = np.zeros((12, 6))
-        self._base_of_joints = np.zeros((6, 12))
-        self._base_of_wrench = np.eye(6)
-        self._factor = np.eye(12)
+        self._base_velocity, self._joint_velocity = self.velocity[:6], self.velocity[6:]
         self._stance = Side.LEFT
+        # Views into Pinocchio's data: each is made once, since making one takes longer than most of what is done
+        # with it. They show the posture that `update_jacobian` saw.
+        self._com, self._com_drift = data.com[0], data.acom[0]
+        self._base = data.oMi[1]
+        self._base_rotation = self._base.rotation
+        self._soles = tuple(data.oMf[frame] for frame in self.sole_frames)
+        self.sole_positions: tuple[Array, Array] = tuple(sole.translation for sole in self._soles)
+        """(3,) left and right sole in odom [m], for the posture that `update_jacobian` saw."""
+        self._sole_rotations = tuple(sole.rotation for sole in self._soles)
+        self.leg_twists: tuple[Array, Array] = (data.J[:, 6:12], data.J[:, 12:18])
+        """(6, 6) each: what the left and right leg's joint speeds add to the foot's twist about odom's origin."""
+        self._com_of_joints = data.Jcom[:, 6:].T
+        self._zero = np.zeros(model.nv)
+        # What unit twists of the stance leg and of the other leg do to the task, (6, 12) each and transposed. The base
+        # moves against the stance leg's twist, and takes CoM, torso and the other foot along.
+        self._task_of_stance = np.hstack([np.vstack([-np.eye(3), np.zeros((3, 3))]), -np.eye(6)[:, 3:]] * 2)
+        self._task_of_other = np.hstack([np.zeros((6, 6)), np.eye(6)])
+        self._stance_levers = (self._task_of_stance[3:, :3], self._task_of_stance[3:, 6:9])
+        self._other_lever = self._task_of_other[3:, 6:9]
+        self._jacobian_transposed = np.zeros((12, 12))
+        self._jacobian = self._jacobian_transposed.T
+        self._leg_rows = (self._jacobian_transposed[:6], self._jacobian_transposed[6:])
+        self._com_rows = self._jacobian_transposed[:, :3]
+        self._factor = np.eye(12)
+        self.twist_to_base = np.eye(6)
+        """(6, 6) from a twist about odom's origin to the base's velocity in its own axes."""
+        self._base_of_stance = np.zeros((6, 6))
+        self._weakest = np.full(12, 1.0 / math.sqrt(12.0))
+        self._singular_value = 1.0
+        self._rate = np.zeros(12)
+        self._target: TaskTarget | None = None
+        self._anchor_pose: Pose2D | None = None
+        self._anchor = pin.SE3.Identity()
 
     def reset(self, base_rotation: Array, base_position: Array, joint_positions: Array) -> None:
         """Set the posture that the integration goes on from."""
@@ -145,10 +234,17 @@ class InverseKinematics:
         self.velocity[:] = 0.0
 
     @property
-    def sole_positions(self) -> tuple[Array, Array]:
-        """(3,) left and right sole in odom [m], for the posture that `update_jacobian` saw."""
-        left, right = self.sole_frames
-        return self.data.oMf[left].translation, self.data.oMf[right].translation
+    def jacobian(self) -> Array:
+        """(12, 12) J of eq. (5), for the posture that `update_jacobian` saw."""
+        return self._jacobian.copy()
+
+    @property
+    def sole_jacobians(self) -> tuple[Array, Array]:
+        """(6, 18) of the left and right sole, odom axes, for the posture that `update_jacobian` saw."""
+        left, right = (
+            pin.getFrameJacobian(self.model, self.data, frame, pin.LOCAL_WORLD_ALIGNED) for frame in self.sole_frames
+        )
+        return left, right
 
     @property
     def joint_positions(self) -> Array:
@@ -159,90 +255,147 @@ class InverseKinematics:
     @property
     def joint_velocities(self) -> Array:
         """(12,) dq_d/dt [rad/s]."""
-        return self.velocity[6:]
+        return self._joint_velocity
+
+    @property
+    def singular_value(self) -> float:
+        """Estimate of the smallest singular value of J, which near a singular posture is exact."""
+        return self._singular_value
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What keeps the target from being reached, in words; empty when nothing does."""
+        notes = []
+        if (target := self._target) is not None:
+            side = self._stance.other
+            com = _distance(target.com, self._com)
+            torso = _angle(target.torso_rotation, self._base_rotation)
+            foot = _distance(target.foot.position, self.sole_positions[side])
+            turn = _angle(rotation_z(target.foot.yaw), self._sole_rotations[side])
+            if com > REPORTED_POSITION_ERROR:
+                notes.append(f"CoM target out of reach: {com:.2f} m away")
+            if torso > REPORTED_ORIENTATION_ERROR:
+                notes.append(f"torso target out of reach: {torso:.2f} rad away")
+            if foot > REPORTED_POSITION_ERROR or turn > REPORTED_ORIENTATION_ERROR:
+                notes.append(f"target of the {side.name.lower()} foot out of reach: {foot:.2f} m, {turn:.2f} rad away")
+        names, positions = self.model.names[2:], self.joint_positions
+        if self._singular_value < SINGULAR_VALUE:
+            joint = names[int(np.abs(self._weakest).argmax())]
+            notes.append(f"near a singular posture: the task hardly moves with {joint}")
+        low, high = self._joint_limits
+        for index in np.flatnonzero((positions <= low) | (positions >= high)).tolist():
+            notes.append(f"{names[index]} is at the end of its range: {positions[index]:.2f} rad")
+        return tuple(notes)
 
     def update_jacobian(self, stance: Side) -> None:
-        """Compute the kinematics of the present posture and J for a stance foot."""
-        model, data, q = self.model, self.data, self.configuration
-        pin.computeJointJacobians(model, data, q)
-        pin.updateFramePlacements(model, data)
-        left, right = self.sole_frames
-        self.sole_jacobians = (
-            pin.getFrameJacobian(model, data, left, pin.LOCAL_WORLD_ALIGNED),
-            pin.getFrameJacobian(model, data, right, pin.LOCAL_WORLD_ALIGNED),
-        )
-        task = np.empty((12, 18))
-        task[:3] = pin.jacobianCenterOfMass(model, data, q, False)
-        # The base's angular velocity is given in its own axes: rotate it to odom.
-        task[3:6] = 0.0
-        task[3:6, 3:6] = data.oMi[1].rotation
-        task[6:] = self.sole_jacobians[stance.other]
-        fixed = self.sole_jacobians[stance]
-        self._base_of_wrench = inverse_of_base_jacobian(fixed)
-        self._base_of_joints = -self._base_of_wrench @ fixed[:, 6:]
-        self._task_of_base = task[:, :6]
-        self.jacobian = task[:, 6:] + self._task_of_base @ self._base_of_joints
-        # The damped normal matrix is positive definite: one Cholesky factor serves velocities and accelerations.
-        # Called without scipy's checks, which cost more than the factorization.
-        self._factor, _ = dpotrf(self.jacobian.T @ self.jacobian + self._damping)
+        """Compute the kinematics of the present posture, and J for a stance foot."""
+        model, data = self.model, self.data
         self._stance = stance
+        # One pass gives placements, CoM, its Jacobian, and the joints' twists about odom's origin (data.J).
+        pin.jacobianCenterOfMass(model, data, self.configuration, False)
+        for frame in self.sole_frames:
+            pin.updateFramePlacement(model, data, frame)
+        self._update_levers()
+        other, twists, rows = stance.other, self.leg_twists, self._leg_rows
+        np.dot(twists[stance].T, self._task_of_stance, out=rows[stance])
+        np.dot(twists[other].T, self._task_of_other, out=rows[other])
+        np.add(self._com_rows, self._com_of_joints, out=self._com_rows)
+        self.twist_to_base = self._base.toActionMatrixInverse()
+        self._base_of_stance = self.twist_to_base.dot(twists[stance])
+        self._factorize()
 
     def solve_velocity(self, target: TaskTarget) -> None:
         """Set the joint velocities of eq. (10) for the posture that `update_jacobian` saw."""
-        data = self.data
-        rate = np.empty(12)
-        rate[:3] = target.com_velocity + self._gain_position * (target.com - data.com[0])
-        rate[3:6] = self._angular_rate(target.torso_rotation, data.oMi[1].rotation, target.torso_angular_velocity)
-        sole = data.oMf[self.sole_frames[self._stance.other]]
-        foot = target.foot
-        rate[6:9] = foot.velocity + self._gain_position * (foot.position - sole.translation)
-        rate[9:12] = self._angular_rate(rotation_z(foot.yaw), sole.rotation, np.array([0.0, 0.0, foot.yaw_rate]))
-        joints = self._damped_solve(rate)
-        self.velocity[6:] = joints
-        self.velocity[:6] = self._base_of_joints @ joints
+        self._target = target
+        foot, other = target.foot, self._stance.other
+        k_p, k_o = self._gain_position, self._gain_orientation
+        self._rate[:] = (
+            *linear_rate(target.com, self._com, target.com_velocity, k_p),
+            *angular_rate(
+                self._base_rotation.dot(target.torso_rotation.T).tolist(), target.torso_angular_velocity.tolist(), k_o
+            ),
+            *linear_rate(foot.position, self.sole_positions[other], foot.velocity, k_p),
+            *angular_rate(turn_from_yaw(foot.yaw, self._sole_rotations[other]), (0.0, 0.0, foot.yaw_rate), k_o),
+        )
+        joints = self._damped_solve(self._rate)
+        fastest = max(map(abs, (joints * self._per_speed_limit).tolist()))
+        if fastest > 1.0:
+            joints /= fastest
+        self._set_joint_velocities(joints)
 
     def solve_acceleration(self, task_acceleration: Array) -> Array:
         """Return the (18,) generalized acceleration that gives a (12,) task acceleration, odom axes.
 
         The derivative of eq. (5), x'' = J q'' + J' q', with the stance sole at rest.
         """
-        model, data, q, v = self.model, self.data, self.configuration, self.velocity
-        zero = np.zeros(model.nv)
-        pin.forwardKinematics(model, data, q, v, zero)
-        pin.centerOfMass(model, data, q, v, zero, False)
-        drift = np.zeros(12)
-        drift[:3] = data.acom[0]
-        drift[6:] = pin.getFrameClassicalAcceleration(
-            model, data, self.sole_frames[self._stance.other], pin.LOCAL_WORLD_ALIGNED
-        ).vector
-        stance_drift = pin.getFrameClassicalAcceleration(
-            model, data, self.sole_frames[self._stance], pin.LOCAL_WORLD_ALIGNED
-        ).vector
-        base = -self._base_of_wrench @ stance_drift
-        joints = self._damped_solve(task_acceleration - drift - self._task_of_base @ base)
-        return np.concatenate([base + self._base_of_joints @ joints, joints])
+        model, data, frames_ = self.model, self.data, self.sole_frames
+        stance = self._stance
+        # With all accelerations zero, what remains is the drift J' q' of the CoM and the feet.
+        pin.centerOfMass(model, data, self.configuration, self.velocity, self._zero, False)
+        stance_drift = pin.getFrameAcceleration(model, data, frames_[stance], pin.WORLD).vector
+        foot_drift = pin.getFrameClassicalAcceleration(model, data, frames_[stance.other], pin.LOCAL_WORLD_ALIGNED)
+        # The base makes up for the drift of the stance sole, and takes the task along.
+        wanted = task_acceleration - self._task_of_stance.T.dot(stance_drift)
+        wanted[:3] -= self._com_drift
+        wanted[6:] -= foot_drift.vector
+        generalized = np.empty(18)
+        joints = generalized[6:] = self._damped_solve(wanted)
+        stance_twist = stance_drift + self.leg_twists[stance].dot(joints[LEG_COLUMNS[stance]])
+        generalized[:6] = -self.twist_to_base.dot(stance_twist)
+        return generalized
 
-    def integrate(self, dt: float, stance_position: Array, stance_yaw: float) -> None:
-        """Advance q_d by dt [s], eq. (7), and put the stance sole back where it stands.
+    def integrate(self, dt: float, stance: Pose2D) -> None:
+        """Advance q_d by dt [s], eq. (7), and put the stance sole back where it stands, in odom.
 
         The sole drifts by the integration's second-order error only, a micrometre a tick, which one
         correction of the base removes.
         """
+        if stance is not self._anchor_pose:  # the same object for a whole step
+            self._anchor_pose = stance
+            self._anchor = pin.SE3(rotation_z(stance.yaw), np.array((stance.x, stance.y, 0.0)))
         q = self.configuration
-        sole = self.data.oMf[self.sole_frames[self._stance]]
-        anchored = pin.SE3(rotation_z(stance_yaw), stance_position)
-        base = (anchored * sole.inverse()) * self.data.oMi[1]
-        q[:3] = base.translation
-        q[3:7] = pin.Quaternion(base.rotation).coeffs()
-        self.configuration = pin.integrate(self.model, q, self.velocity * dt)
-        np.clip(self.configuration[7:], self._joint_limits[0], self._joint_limits[1], out=self.configuration[7:])
+        q[:7] = pin.SE3ToXYZQUAT(self._anchor * self._soles[self._stance].actInv(self._base))
+        q = self.configuration = pin.integrate(self.model, q, self.velocity * dt)
+        joints = q[7:]
+        wanted = joints.tolist()
+        # Two ufuncs: numpy's clip takes four times as long.
+        np.minimum(joints, self._joint_limits[1], out=joints)
+        np.maximum(joints, self._joint_limits[0], out=joints)
+        if joints.tolist() != wanted:
+            # A joint that is at its end rests there.
+            self._set_joint_velocities(np.where(joints == wanted, self._joint_velocity, 0.0))
 
-    def _angular_rate(self, desired: Array, actual: Array, angular_velocity: Array) -> Array:
-        """Return L^-1 (L^T w_d + K_o e_o), the orientation rows of eq. (10)."""
-        matrix = error_rate_matrix(desired, actual)
-        error = orientation_error(desired, actual)
-        return solve_3(matrix, matrix.T @ angular_velocity + self._gain_orientation * error)
+    def _update_levers(self) -> None:
+        """Enter where CoM and other foot lie: a point r of a body with twist (v, w) moves with v - S(r) w."""
+        com, foot = self._com, self.sole_positions[self._stance.other]
+        # Transposed, and for the stance leg with the opposite sign: S(r) becomes its own negative twice.
+        _set_lever(self._stance_levers[0], -1.0, com)
+        _set_lever(self._stance_levers[1], -1.0, foot)
+        _set_lever(self._other_lever, 1.0, foot)
+
+    def _factorize(self) -> None:
+        """Factorize J^T J + damping, once for velocities and accelerations, and see how singular it is.
+
+        One inverse iteration a tick, begun from the last tick's result, keeps `_weakest` on the direction of joint
+        space that moves the task least, and gives its singular value (Maciejewski and Klein, 1988).
+        """
+        # BLAS and LAPACK without scipy's checks, which cost more than the work. Damped, it cannot fail.
+        self._factor, _ = dpotrf(dsyrk(1.0, self._jacobian, beta=1.0, c=self._damping_matrix, trans=1), clean=0)
+        grown = dpotrs(self._factor, self._weakest)[0]
+        growth = math.sqrt(grown.dot(grown))
+        np.multiply(grown, 1.0 / growth, out=self._weakest)
+        square = max(1.0 / growth - self._damping, 0.0)
+        self._singular_value = math.sqrt(square)
+        if self._singular_value < SINGULAR_VALUE:
+            # From nothing at the threshold to SINGULAR_VALUE^2 where the direction is lost.
+            damping = (self._damping + SINGULAR_VALUE**2 - square) * np.eye(12)
+            self._factor, _ = dpotrf(dsyrk(1.0, self._jacobian, beta=1.0, c=damping, trans=1), clean=0)
 
     def _damped_solve(self, rate: Array) -> Array:
-        solution: Array = dpotrs(self._factor, self.jacobian.T @ rate)[0]
+        solution: Array = dpotrs(self._factor, self._jacobian_transposed.dot(rate))[0]
         return solution
+
+    def _set_joint_velocities(self, joints: Array) -> None:
+        """Set the joints' speeds and the base's that leaves the stance sole at rest."""
+        self._joint_velocity[:] = joints
+        np.negative(self._base_of_stance.dot(joints[LEG_COLUMNS[self._stance]]), out=self._base_velocity)

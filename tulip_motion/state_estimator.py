@@ -6,6 +6,7 @@ heading, so only the stance foot's slip and the landing pose's error add up in t
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,9 @@ from tulip_motion.interface import Side
 from tulip_motion.parameters import MotionParameters
 
 Array = NDArray[np.float64]
+Quaternion = tuple[float, float, float, float]
+"""x, y, z, w; of unit length."""
+Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -68,15 +72,20 @@ class StateEstimator:
         """
         self._parameters = parameters
         self._model = model
-        self._data = model.createData()
+        data = self._data = model.createData()
         self._soles = (model.getFrameId(frames.LEFT_SOLE), model.getFrameId(frames.RIGHT_SOLE))
         self._cells = cell_positions
         self._imu_rotation = imu_rotation
+        self._imu_to_base = quaternion_conjugate(tuple(pin.Quaternion(imu_rotation).coeffs().tolist()))
         self._configuration = pin.neutral(model)
         self._velocity = np.zeros(model.nv)
+        # Views into Pinocchio's data, made once: making one takes as long as what is done with it.
+        self._model_com, self._model_com_velocity = data.com[0], data.vcom[0]
+        self._base_rotation = data.oMi[1].rotation
+        self._sole_positions = tuple(data.oMf[i].translation for i in self._soles)
         self._heading_offset: float | None = None
-        self._com: Array | None = None
-        self._com_velocity = np.zeros(3)
+        self._com: list[float] | None = None
+        self._com_velocity = [0.0, 0.0, 0.0]
         self.anchors: list[Pose2D] = [Pose2D(), Pose2D()]
 
     def anchor(self, foot: Footstep) -> None:
@@ -95,56 +104,69 @@ class StateEstimator:
             left_weight: 1 when the left foot fixes the body, 0 when the right does, between in double support.
             acceleration: (3,) acceleration of the CoM that the last command asked for, odom axes [m/s^2].
         """
-        rotation = self._attitude(sensors)
         q, v = self._configuration, self._velocity
-        q[:3] = 0.0
-        q[3:7] = pin.Quaternion(rotation).coeffs()
+        q[3:7] = self._attitude(sensors)
         q[7:] = sensors.joint_positions[:12]
-        v[:3] = 0.0
-        v[3:6] = self._imu_rotation @ sensors.imu_angular_velocity
+        v[3:6] = self._imu_rotation.dot(sensors.imu_angular_velocity)
         v[6:] = sensors.joint_velocities[:12]
         model, data = self._model, self._data
+        # The base stays at the origin and at rest: where it is and how it moves follows from the feet.
         pin.centerOfMass(model, data, q, v, False)
-        pin.updateFramePlacements(model, data)
-        soles = [data.oMf[i].homogeneous for i in self._soles]
+        soles = np.empty((2, 4, 4))
+        for side, frame in enumerate(self._soles):
+            soles[side] = pin.updateFramePlacement(model, data, frame).homogeneous
         if self._com is None:
             self._begin(soles)
-        position, velocity = np.zeros(3), np.zeros(3)
+        position, velocity = self._from_feet(left_weight)
+        x, y, z = position
+        for sole, place in zip(soles, self._sole_positions, strict=True):
+            px, py, pz = place.tolist()
+            sole[:3, 3] = (px + x, py + y, pz + z)
+        rotation = self._base_rotation.copy()
+        com, com_velocity = self._observe(position, velocity, acceleration)
+        cells = sensors.foot_cells
+        loads = (sum(cells[0].tolist()), sum(cells[1].tolist()))
+        return Estimate(
+            np.array(position),
+            rotation,
+            np.array(velocity),
+            rotation.dot(v[3:6]),
+            q[7:].copy(),
+            v[6:].copy(),
+            com,
+            com_velocity,
+            soles,
+            self._centre_of_pressure(cells, soles, loads),
+            loads,
+            math.acos(min(max(rotation[2, 2], -1.0), 1.0)),
+        )
+
+    def _attitude(self, sensors: Sensors) -> Quaternion:
+        """Return the attitude of base_link; its heading counts from the one at the start."""
+        attitude = quaternion_product(tuple(sensors.imu_orientation.tolist()), self._imu_to_base)
+        if self._heading_offset is None:
+            self._heading_offset = -quaternion_yaw(attitude)
+        half = 0.5 * self._heading_offset
+        return quaternion_product((0.0, 0.0, math.sin(half), math.cos(half)), attitude)
+
+    def _from_feet(self, left_weight: float) -> tuple[Point, Point]:
+        """Return position [m] and velocity [m/s] of the base that leave the feet that carry where they stand."""
+        x = y = z = vx = vy = vz = 0.0
         for side, weight in ((Side.LEFT, left_weight), (Side.RIGHT, 1.0 - left_weight)):
             if weight > 0.0:
                 anchor = self.anchors[side]
-                position += weight * (np.array([anchor.x, anchor.y, 0.0]) - soles[side][:3, 3])
-                motion = pin.getFrameVelocity(model, data, self._soles[side], pin.LOCAL_WORLD_ALIGNED)
-                velocity -= weight * motion.linear
-        for sole in soles:
-            sole[:3, 3] += position
-        self._observe(data.com[0] + position, data.vcom[0] + velocity, acceleration)
-        assert self._com is not None
-        cells = sensors.foot_cells
-        loads = (float(cells[0].sum()), float(cells[1].sum()))
-        return Estimate(
-            position,
-            rotation,
-            velocity,
-            rotation @ v[3:6],
-            sensors.joint_positions[:12].copy(),
-            sensors.joint_velocities[:12].copy(),
-            self._com.copy(),
-            self._com_velocity.copy(),
-            np.stack(soles),
-            self._centre_of_pressure(cells, soles),
-            loads,
-            float(np.arccos(np.clip(rotation[2, 2], -1.0, 1.0))),
-        )
+                px, py, pz = self._sole_positions[side].tolist()
+                x += weight * (anchor.x - px)
+                y += weight * (anchor.y - py)
+                z -= weight * pz
+                motion = pin.getFrameVelocity(self._model, self._data, self._soles[side], pin.LOCAL_WORLD_ALIGNED)
+                wx, wy, wz = motion.linear.tolist()
+                vx -= weight * wx
+                vy -= weight * wy
+                vz -= weight * wz
+        return (x, y, z), (vx, vy, vz)
 
-    def _attitude(self, sensors: Sensors) -> Array:
-        rotation: Array = pin.Quaternion(*_wxyz(sensors.imu_orientation)).toRotationMatrix() @ self._imu_rotation.T
-        if self._heading_offset is None:
-            self._heading_offset = -float(np.arctan2(rotation[1, 0], rotation[0, 0]))
-        c, s = np.cos(self._heading_offset), np.sin(self._heading_offset)
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ rotation
-
-    def _begin(self, soles: list[Array]) -> None:
+    def _begin(self, soles: Array) -> None:
         """Set the anchors such that the left foot stays where it was believed to be, the right beside it."""
         left = planar_pose(soles[Side.LEFT])
         keep = self.anchors[Side.LEFT]
@@ -153,33 +175,76 @@ class StateEstimator:
             keep = left
         self.anchors = [Pose2D(keep.x, keep.y, left.yaw), keep_distance(keep, left, right)]
 
-    def _observe(self, com: Array, velocity: Array, acceleration: Array) -> None:
-        """Predict the CoM with the commanded acceleration and pull it to the measured one."""
-        if self._com is None:
-            self._com, self._com_velocity = com.copy(), np.zeros(3)
-            return
-        p, dt = self._parameters, self._parameters.control_period
-        self._com += dt * (self._com_velocity + p.observer_position_gain * (com - self._com))
-        self._com_velocity += dt * (acceleration + p.observer_velocity_gain * (velocity - self._com_velocity))
+    def _observe(self, position: Point, velocity: Point, acceleration: Array) -> tuple[Array, Array]:
+        """Predict the CoM with the commanded acceleration and pull it to the measured one; return its state.
 
-    def _centre_of_pressure(self, cells: Array, soles: list[Array]) -> Array:
-        total = float(cells.sum())
+        Args:
+            position: Of the base [m]; the model's CoM counts from there.
+            velocity: Of the base [m/s].
+            acceleration: (3,) of the CoM, as commanded [m/s^2].
+        """
+        p, dt = self._parameters, self._parameters.control_period
+        measured = [c + base for c, base in zip(self._model_com.tolist(), position, strict=True)]
+        if self._com is None:
+            self._com, self._com_velocity = measured, [0.0, 0.0, 0.0]
+        else:
+            k_p, k_v = p.observer_position_gain, p.observer_velocity_gain
+            for i, (c, v, a, m, mv, base) in enumerate(
+                zip(
+                    self._com,
+                    self._com_velocity,
+                    acceleration.tolist(),
+                    measured,
+                    self._model_com_velocity.tolist(),
+                    velocity,
+                    strict=True,
+                )
+            ):
+                self._com[i] = c + dt * (v + k_p * (m - c))
+                self._com_velocity[i] = v + dt * (a + k_v * (mv + base - v))
+        return np.array(self._com), np.array(self._com_velocity)
+
+    def _centre_of_pressure(self, cells: Array, soles: Array, loads: tuple[float, float]) -> Array:
+        """Return where the cells' forces act together, seen from above."""
+        total = loads[0] + loads[1]
         if total < self._parameters.contact_force:
             return np.full(2, np.nan)
-        moment = np.zeros(2)
-        for side in Side:
-            points = self._cells[side] @ soles[side][:2, :2].T + soles[side][:2, 3]
-            moment += cells[side] @ points
-        return moment / total
+        x = y = 0.0
+        for force, points, sole, load in zip(cells, self._cells, soles[:, :2].tolist(), loads, strict=True):
+            forward, left = force.dot(points).tolist()  # load times the place in the sole
+            (xx, xy, _, px), (yx, yy, _, py) = sole
+            x += load * px + xx * forward + xy * left
+            y += load * py + yx * forward + yy * left
+        return np.array((x / total, y / total))
 
 
-def _wxyz(xyzw: Array) -> tuple[float, float, float, float]:
-    return float(xyzw[3]), float(xyzw[0]), float(xyzw[1]), float(xyzw[2])
+def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Return a b, the rotation b followed by a. Plain numbers: an object for each would take longer."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def quaternion_conjugate(a: Quaternion) -> Quaternion:
+    """Return the inverse rotation."""
+    x, y, z, w = a
+    return -x, -y, -z, w
+
+
+def quaternion_yaw(a: Quaternion) -> float:
+    """Return the heading of the rotated x axis [rad]."""
+    x, y, z, w = a
+    return math.atan2(2.0 * (x * y + w * z), w * w + x * x - y * y - z * z)
 
 
 def planar_pose(transform: Array) -> Pose2D:
     """Return where a (4, 4) transform lies on the ground, with its yaw."""
-    return Pose2D(float(transform[0, 3]), float(transform[1, 3]), float(np.arctan2(transform[1, 0], transform[0, 0])))
+    return Pose2D(float(transform[0, 3]), float(transform[1, 3]), math.atan2(transform[1, 0], transform[0, 0]))
 
 
 def keep_distance(anchor: Pose2D, measured: Pose2D, other: Pose2D) -> Pose2D:

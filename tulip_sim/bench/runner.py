@@ -24,6 +24,9 @@ class Bench:
         trials: What to run, as arguments of `measure`; each is independent of the others.
         measure: Runs one trial; a function of a module, so that other processes can call it.
         summarize: Turns the rows into markdown lines: what was asked, what came out.
+        draw: Writes docs/results/NAME.png from the rows.
+        workers: Processes at most; 1 for a bench that measures time, whose trials must not disturb each other.
+        prepare: Gets what the trials need besides, and tells of it; RuntimeError if it cannot be had.
     """
 
     name: str
@@ -31,6 +34,9 @@ class Bench:
     trials: Sequence[tuple[Any, ...]]
     measure: Callable[..., Row]
     summarize: Callable[[list[Row]], list[str]]
+    draw: Callable[[Sequence[Row], Path], None] | None = None
+    workers: int | None = None
+    prepare: Callable[[Callable[[str], None]], None] | None = None
 
 
 def run(bench: Bench, workers: int | None = None, done: Callable[[Row], None] | None = None) -> list[Row]:
@@ -38,14 +44,14 @@ def run(bench: Bench, workers: int | None = None, done: Callable[[Row], None] | 
 
     Args:
         bench: What to measure.
-        workers: Processes; all cores by default.
+        workers: Processes; by default all cores, or as many as the bench allows.
         done: Told of each row as it comes.
     """
     rows: dict[int, Row] = {}
     # Each worker is one single-threaded process: more threads would only wait for each other.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    with ProcessPoolExecutor(workers or os.cpu_count()) as pool:
+    with ProcessPoolExecutor(bench.workers or workers or os.cpu_count()) as pool:
         futures = {pool.submit(bench.measure, *trial): index for index, trial in enumerate(bench.trials)}
         for future in as_completed(futures):
             rows[futures[future]] = row = future.result()
@@ -75,5 +81,8 @@ def write_results(benches: Sequence[Bench], folder: Path, page: Path) -> None:
         path = folder / f"{bench.name}.json"
         if path.exists():
             rows = json.loads(path.read_text())["rows"]
-            lines += ["", f"## {bench.title} (`{bench.name}`)", "", *bench.summarize(rows)]
+            lines += ["", f"## {bench.title} (`{bench.name}`)", ""]
+            if (folder / f"{bench.name}.png").exists():
+                lines += [f"![{bench.title}]({folder.name}/{bench.name}.png)", ""]
+            lines += bench.summarize(rows)
     page.write_text("\n".join(lines) + "\n")
