@@ -30,6 +30,7 @@ from tulip_motion.inverse_kinematics import InverseKinematics, TaskTarget, orien
 from tulip_motion.joint_control import JointGains, feedback
 from tulip_motion.kick import Kick
 from tulip_motion.lipm import time_constant
+from tulip_motion.paper_gait import PaperGait
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.stabilizer import Balance, stabilize
 from tulip_motion.state_estimator import Estimate, StateEstimator, planar_pose
@@ -65,13 +66,16 @@ class Motion:
         self._command = WalkCommand(0, WalkMode.STAND)
         self._mode = MotionMode.STAND
         self._reason = ""
-        self._gait: Walking | Kick | None = None
+        self._gait: Walking | PaperGait | Kick | None = None
         self._steps_before = 0
         self._started = False
         self._sequence = 0
         self._stamp = 0
         self._acceleration = np.zeros(3)
         self._height = 0.0
+        self._standing_on: Footstep | None = None
+        self._com_planned = np.zeros(2)
+        self._com_planned_velocity = np.zeros(2)
         self._left_weight = 0.5
         self._distance = 0.0
         self._torques = np.zeros((2, 12))
@@ -114,6 +118,7 @@ class Motion:
         if self._mode in (MotionMode.LIMP, MotionMode.FALLEN):
             return self._limp(estimate)
         reference = self._reference = self._advance_gait(estimate)
+        self._plan_com(reference)
         balance = self._balance = self._stabilize(estimate, reference)
         self._left_weight = 1.0 - balance.right_share
         return self._track(estimate, reference, balance)
@@ -143,11 +148,11 @@ class Motion:
             self._mode,
             reference.support if reference else Support.NONE,
             reference.phase if reference else 0.0,
-            self._steps_before + (self._gait.step_count if isinstance(self._gait, Walking) else 0),
+            self._steps_before + (self._gait.step_count if isinstance(self._gait, Walking | PaperGait) else 0),
             estimate.com,
-            np.array([*estimate.com[:2], self._height]),
+            np.array([*self._com_planned, self._height]) if reference else np.full(3, np.nan),
             estimate.com_velocity,
-            np.array([*((planned - estimate.com[:2]) * self._omega), 0.0]),
+            np.array([*self._com_planned_velocity, 0.0]) if reference else np.full(3, np.nan),
             dcm,
             planned,
             estimate.zmp,
@@ -175,6 +180,7 @@ class Motion:
         """Begin to stand where the robot is."""
         self._kinematics.reset(estimate.base_rotation, estimate.base_position, estimate.joint_positions)
         self._height = float(estimate.com[2])
+        self._com_planned = estimate.com[:2].copy()
         self._acceleration = np.zeros(3)
         self._left_weight = 0.5
         self._started = True
@@ -192,18 +198,19 @@ class Motion:
         elif wanted is WalkMode.LIMP:
             self._mode, self._reason = MotionMode.LIMP, "limp on request"
         elif self._gait is not None and self._gait.finished:
-            if isinstance(self._gait, Walking):
+            if isinstance(self._gait, Walking | PaperGait):
                 self._steps_before += self._gait.step_count
             self._gait = None
             self._mode = MotionMode.STAND
         elif self._mode is MotionMode.STAND and wanted is WalkMode.WALK:
-            self._gait = Walking(p, self._feet(), self._middle())
+            gait = PaperGait if p.gait == "paper" else Walking
+            self._gait = gait(p, self._feet(), self._middle())
             self._mode = MotionMode.WALK
 
     def _advance_gait(self, estimate: Estimate) -> Reference:
         dt = self._parameters.control_period
         dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
-        if isinstance(self._gait, Walking):
+        if isinstance(self._gait, Walking | PaperGait):
             velocity = self._command.velocity if self._command.mode is WalkMode.WALK else None
             landed = [planar_pose(sole) for sole in estimate.soles]
             reference = self._gait.tick(dt, velocity, (dcm[0], dcm[1]), landed, estimate.loads)
@@ -235,8 +242,19 @@ class Motion:
                 self._distance += 0.5 * math.hypot(foot.pose.x - old.x, foot.pose.y - old.y)
                 self._estimator.anchor(foot)
 
+    def _plan_com(self, reference: Reference) -> None:
+        """Keep the CoM that belongs to the plan: given, or the one that its DCM leads, c' = (xi - c) / Tc."""
+        if reference.com is not None:
+            self._com_planned, self._com_planned_velocity = reference.com.position, reference.com.velocity
+            return
+        share = 1.0 - math.exp(-self._omega * self._parameters.control_period)
+        self._com_planned = self._com_planned + share * (reference.dcm - self._com_planned)
+        self._com_planned_velocity = self._omega * (reference.dcm - self._com_planned)
+
     def _stabilize(self, estimate: Estimate, reference: Reference) -> Balance:
-        dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
+        # In open loop nothing is corrected: the plan's own DCM leaves the plan's ZMP.
+        measured = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
+        dcm = measured if reference.com is None else reference.dcm
         other = None
         if reference.support is Support.DOUBLE:
             foot = reference.other
@@ -253,38 +271,23 @@ class Motion:
         step = HEIGHT_RATE * p.control_period
         climb = min(max(p.com_height - self._height, -step), step)
         self._height += climb
-        com_target = np.array([estimate.com[0], estimate.com[1], self._height])
-        com_rate = np.array([estimate.com_velocity[0], estimate.com_velocity[1], climb / p.control_period])
+        rate = climb / p.control_period
+        com, velocity = estimate.com, estimate.com_velocity
+        if reference.com is not None:
+            com, velocity = reference.com.position, reference.com.velocity
+            self._stand_on(reference.stance)
+        com_target, com_rate = np.array([com[0], com[1], self._height]), np.array([velocity[0], velocity[1], rate])
         torso = rotation_z(reference.torso_yaw)
         torso_rate = np.array([0.0, 0.0, reference.torso_yaw_rate])
         kinematics.update_jacobian(reference.stance.side)
         kinematics.solve_velocity(TaskTarget(com_target, com_rate, torso, torso_rate, reference.other))
 
-        acceleration = np.empty(12)
-        acceleration[:2] = self._omega**2 * (estimate.com[:2] - balance.zmp)
-        acceleration[2] = p.height_stiffness * (self._height - estimate.com[2]) - p.height_damping * (
-            estimate.com_velocity[2] - com_rate[2]
-        )
-        acceleration[3:6] = p.torso_stiffness * orientation_error(torso, estimate.base_rotation) + p.torso_damping * (
-            torso_rate - estimate.angular_velocity
-        )
-        acceleration[6:9] = reference.other.acceleration
-        acceleration[9:] = (0.0, 0.0, reference.other.yaw_acceleration)
+        acceleration = self._task_acceleration(estimate, reference, balance, torso, torso_rate, rate)
         self._acceleration = acceleration[:3].copy()
-        generalized = kinematics.solve_acceleration(acceleration)
-        torques = feedforward(
-            self._model,
-            kinematics.data,
-            kinematics.configuration,
-            kinematics.velocity,
-            generalized,
-            kinematics.sole_positions,
-            kinematics.sole_jacobians,
-            *self._sharing(reference, balance),
-        )
+        torques = self._feedforward(acceleration, reference, balance)
         stance = reference.stance.pose
         kinematics.integrate(p.control_period, np.array([stance.x, stance.y, 0.0]), stance.yaw)
-        stiffness, damping = self._gains.of(reference.support)
+        stiffness, damping = self._gains.of(reference.support, reference.com is not None)
         self._torques[0] = feedback(
             stiffness,
             damping,
@@ -296,11 +299,73 @@ class Motion:
             kinematics.joint_positions.copy(), kinematics.joint_velocities.copy(), torques, stiffness, damping
         )
 
+    def _stand_on(self, stance: Footstep) -> None:
+        """Move the desired posture as a whole to a new stance foot, so that its joints take no notice of the change."""
+        if stance == self._standing_on:
+            return
+        self._standing_on = stance
+        kinematics = self._kinematics
+        q, data = kinematics.configuration, kinematics.data
+        pin.framesForwardKinematics(self._model, data, q)
+        sole = data.oMf[kinematics.sole_frames[stance.side]]
+        anchored = pin.SE3(rotation_z(stance.pose.yaw), np.array([stance.pose.x, stance.pose.y, 0.0]))
+        base = anchored * sole.inverse() * data.oMi[1]
+        q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
+
+    def _task_acceleration(
+        self,
+        estimate: Estimate,
+        reference: Reference,
+        balance: Balance,
+        torso: Array,
+        torso_rate: Array,
+        height_rate: float,
+    ) -> Array:
+        """Return (12,) of the CoM, the torso and the other foot: planned, or led by what is measured."""
+        p = self._parameters
+        acceleration = np.zeros(12)
+        acceleration[6:9] = reference.other.acceleration
+        acceleration[11] = reference.other.yaw_acceleration
+        if reference.com is not None:
+            acceleration[:2] = reference.com.acceleration
+            acceleration[5] = 0.5 * reference.other.yaw_acceleration
+            return acceleration
+        acceleration[:2] = self._omega**2 * (estimate.com[:2] - balance.zmp)
+        acceleration[2] = p.height_stiffness * (self._height - estimate.com[2]) - p.height_damping * (
+            estimate.com_velocity[2] - height_rate
+        )
+        acceleration[3:6] = p.torso_stiffness * orientation_error(torso, estimate.base_rotation) + p.torso_damping * (
+            torso_rate - estimate.angular_velocity
+        )
+        return acceleration
+
+    def _feedforward(self, acceleration: Array, reference: Reference, balance: Balance) -> Array:
+        """Return (12,) tau_ff: eq. (14) in full, its term of gravity alone, or none."""
+        p, kinematics = self._parameters, self._kinematics
+        if p.feedforward == "none":
+            return np.zeros(12)
+        velocity, generalized = kinematics.velocity, np.zeros(18)
+        if p.feedforward == "full":
+            generalized = kinematics.solve_acceleration(acceleration)
+        else:
+            velocity = np.zeros(18)
+        return feedforward(
+            self._model,
+            kinematics.data,
+            kinematics.configuration,
+            velocity,
+            generalized,
+            kinematics.sole_positions,
+            kinematics.sole_jacobians,
+            *self._sharing(reference, balance),
+        )
+
     def _sharing(self, reference: Reference, balance: Balance) -> tuple[float, tuple[Array, Array] | None]:
         """Return alpha, and the aim points of the ZMP on the left and right foot in odom [m] or None, eq. (15)."""
         p = self._parameters
         if p.weight_sharing == "distance":
-            return distance_share(self._estimate.com, *self._kinematics.sole_positions), None
+            com = self._estimate.com if reference.com is None else reference.com.position
+            return distance_share(com, *self._kinematics.sole_positions), None
         foot = reference.other
         other = Footstep(
             reference.stance.side.other, Pose2D(float(foot.position[0]), float(foot.position[1]), foot.yaw)
