@@ -20,6 +20,11 @@ from tulip_sim.timing import TICK
 SPEED = 0.2  # [m/s]
 SEEDS = 3
 DURATION = 30.0  # [s]
+GAITS: dict[str, dict[str, Any]] = {
+    "dcm": {"gait": "dcm"},
+    "paper": {"gait": "paper"},
+    "paper, smooth": {"gait": "paper", "paper_swing": "smooth"},
+}
 LEARNINGS = ("none",)
 FALLING = 1.0  # [s] before a fall is detected; errors of a falling robot say nothing of its control
 START = Pose2D(-4.0, 2.2, 0.0)  # the way leads past the goal
@@ -29,7 +34,7 @@ NO_WEIGHTING = "-"  # without feedforward there is nothing to weigh
 def combinations() -> list[tuple[str, str, str, str]]:
     """Return gait, feedforward, weighting and learning of each line of the table."""
     lines = []
-    for gait, feedforward, learning in product(CHOICES["gait"], CHOICES["feedforward"], LEARNINGS):
+    for gait, feedforward, learning in product(GAITS, CHOICES["feedforward"], LEARNINGS):
         weightings = (NO_WEIGHTING,) if feedforward == "none" else CHOICES["weight_sharing"]
         lines += [(gait, feedforward, weighting, learning) for weighting in weightings]
     return lines
@@ -37,7 +42,7 @@ def combinations() -> list[tuple[str, str, str, str]]:
 
 def parameters(gait: str, feedforward: str, weighting: str, learning: str) -> MotionParameters:
     """Return the parameters of one line."""
-    changes: dict[str, Any] = {"gait": gait, "feedforward": feedforward}
+    changes = GAITS[gait] | {"feedforward": feedforward}
     if weighting != NO_WEIGHTING:
         changes["weight_sharing"] = weighting
     if "learning" in {field.name for field in fields(MotionParameters)}:
