@@ -272,8 +272,10 @@ class Motion:
         climb = min(max(p.com_height - self._height, -step), step)
         self._height += climb
         rate = climb / p.control_period
-        com, velocity = estimate.com, estimate.com_velocity
-        if reference.com is not None:
+        if reference.com is None:
+            com, velocity = estimate.com, estimate.com_velocity
+            self._standing_on = None
+        else:
             com, velocity = reference.com.position, reference.com.velocity
             self._stand_on(reference.stance)
         com_target, com_rate = np.array([com[0], com[1], self._height]), np.array([velocity[0], velocity[1], rate])
