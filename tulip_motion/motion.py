@@ -165,6 +165,7 @@ class Motion:
             self._torques[0],
             self._torques[1],
             reason=self._reason,
+            notes=self._gait.notes if isinstance(self._gait, PaperGait) else (),
         )
 
     def _feet(self) -> tuple[Footstep, Footstep]:

@@ -27,6 +27,8 @@ from tulip_motion.mirrored_step import (
 from tulip_motion.parameters import MotionParameters
 
 Velocity = tuple[float, float, float]
+AXES = ("speed forward", "speed sideways", "turning rate")
+UNITS = ("m/s", "m/s", "rad/s")
 
 
 class Rocking:
@@ -78,6 +80,7 @@ class PaperGait:
         self.velocity: Velocity = (0.0, 0.0, 0.0)
         self.step_count = 0
         self.finished = False
+        self.notes: tuple[str, ...] = ()
         self._zmp = zmp
         self._shape = StepShape(
             p.step_time,
@@ -174,6 +177,11 @@ class PaperGait:
         """Return the speed for this step: within the law's limits and not far from the present one."""
         p = self._parameters
         most = (p.paper_max_speed, self._most_sideways, p.paper_max_turn_rate)
+        self.notes = tuple(
+            f"{name} of {value:.2f} {unit} is more than the paper's gait can: {limit:.2f} {unit}"
+            for name, unit, value, limit in zip(AXES, UNITS, wanted, most, strict=True)
+            if abs(value) > limit
+        )
         change = (p.max_speed_change, p.max_speed_change, p.max_turn_change)
         forward, left, turn = (
             min(max(value, -limit, now - step), limit, now + step)

@@ -56,7 +56,7 @@ class MotionParameters:
     # The paper's gait. Eq. (4) as printed is "sat" with both times 0: the foot rises at 4 m/s, and lands at 2 c'
     paper_swing: str = "sat"  # "sat": eq. (4), its speed limited by paper_lift_time; "smooth": quintics up and down
     paper_lift_time: float = 0.08  # [s] the foot takes to rise to swing_height, and to come down
-    paper_settle_time: float = 0.1  # [s] from rest to the mirrored motion, and back; without it the robot falls
+    paper_settle_time: float = 0.1  # [s] from rest to the mirrored motion, and back; with 0 it falls after 10-25 s
     paper_zmp_inward: float = 0.03  # [m] pivot from the middle of the sole towards the other foot: it sways less
     paper_max_speed: float = 0.3  # [m/s] forward and backward
     paper_max_turn_rate: float = 0.4  # [rad/s] every foot lands turned by a whole step's turn: toes come together

@@ -272,6 +272,19 @@ def test_the_gait_advances_by_the_commanded_velocity(velocity: Velocity) -> None
         assert chord == pytest.approx(way * math.sin(turn / 2) / (turn / 2), rel=0.01)
 
 
+def test_a_command_beyond_the_law_is_clipped_and_named() -> None:
+    ideal = Ideal()
+    ideal.go(3.0, (0.1, 0.5, 0.0))
+    limit = sideways_limit(
+        PRINTED, P.stance_width - 2 * P.paper_zmp_inward, P.min_foot_distance - 2 * P.paper_zmp_inward
+    )
+    assert ideal.gait.velocity == pytest.approx((0.1, limit, 0.0))
+    (note,) = ideal.gait.notes
+    assert note.startswith(f"speed sideways of 0.50 m/s is more than the paper's gait can: {limit:.2f}")
+    ideal.go(1.0, (0.1, 0.0, 0.0))
+    assert ideal.gait.notes == ()
+
+
 def test_what_is_measured_does_not_change_the_plan() -> None:
     exact, slipped = Ideal(start=Pose2D()), Ideal(start=Pose2D())
     exact.go(4.0, (0.2, 0.0, 0.0))
