@@ -1,9 +1,9 @@
 """One step of the paper's gait, eqs. (3)-(4), in the frame of the stance foot.
 
-The origin is the pivot that the pendulum stands on, the middle of the stance sole; x points forward along the
-foot. Over a step of duration T the CoM follows eq. (3) and the swing foot mirrors it, eq. (4): it is at 2 x_c,
-2 y_c, so the CoM is always midway between the feet. When it lands, the CoM is at -c(T) from it, with the same
-velocity: the next step is known. With C = cosh(T/Tc), S = sinh(T/Tc), the map of an axis from step to step is
+The origin is the pivot that the pendulum stands on, a point of the stance sole; x points forward along the foot.
+Over a step of duration T the CoM follows eq. (3) and the same point of the swing foot's sole mirrors it, eq. (4): it
+is at 2 x_c, 2 y_c, so the CoM is always midway between the feet. When it lands, the CoM is at -c(T) from it, with the
+same velocity: the next step is known. With C = cosh(T/Tc), S = sinh(T/Tc), the map of an axis from step to step is
 
     x_c(0)    [ -C     -Tc S ] x_c(0)
     x_c'(0) = [ S/Tc     C   ] x_c'(0),
@@ -85,7 +85,7 @@ class StepShape:
         profile: "sat", eq. (4), or "smooth": up and down by quintics, without a jump of speed.
         settle_time: Time after the beginning and before the end of a step in which the foot goes between rest on the
             ground and the mirrored motion [s]; 0 leaves eq. (4) as it is printed.
-        aim: (forward, inward) middle of the sole from the sole's frame; inward is towards the other foot [m].
+        aim: (forward, inward) place of the pivot in the sole's frame; inward is towards the other foot [m].
     """
 
     duration: float
@@ -102,7 +102,7 @@ class StepShape:
         return time_constant(self.com_height)
 
     def sole_offset(self, side: Side) -> tuple[float, float]:
-        """Return the middle of a sole in its frame [m]."""
+        """Return the place of the pivot in a sole's frame [m]."""
         forward, inward = self.aim
         return forward, -inward if side is Side.LEFT else inward
 
@@ -144,7 +144,7 @@ class MirroredStep:
         side: The stance foot.
         start: CoM when the step begins.
         pivot: Place of the ZMP [m]; (0, 0) is eq. (3) as printed.
-        before, after: Middle of the swing foot's sole when the step begins and ends; at 2 c(0) and 2 c(T) the foot
+        before, after: Pivot of the swing foot when the step begins and ends; at 2 c(0) and 2 c(T) the foot
             follows eq. (4) as printed, otherwise it is led from one to the other by a quintic on top.
     """
 
@@ -178,7 +178,7 @@ class MirroredStep:
         yaw, yaw_rate, yaw_bend = self.before.yaw + progress * turn, rate * turn, bend * turn
         forward, left = self.shape.sole_offset(self.side.other)
         c, s = math.cos(yaw), math.sin(yaw)
-        arm = (c * forward - s * left, s * forward + c * left)  # from the sole's frame to its middle
+        arm = (c * forward - s * left, s * forward + c * left)  # from the sole's frame to its pivot
         turned = (-arm[1], arm[0])
         places = ((self.before.x, self.after.x), (self.before.y, self.after.y))
         position, velocity, acceleration = np.empty(3), np.empty(3), np.empty(3)
@@ -230,7 +230,7 @@ def periodic_state(shape: StepShape, side: Side, width: float, way: tuple[float,
     Args:
         shape: Of the steps.
         side: The stance foot.
-        width: Distance between the middles of the feet [m].
+        width: Distance between the pivots of the feet [m].
         way: (forward, left) of each step [m].
     """
     tc = shape.time_constant
@@ -263,10 +263,10 @@ def step_between(
         shape: Of the steps.
         side: The stance foot.
         start: CoM when the step begins, from the stance foot.
-        before: Where the middle of the swing foot's sole stands, from the stance foot's.
+        before: Where the swing foot's pivot is, from the stance foot's.
         turn: Yaw of the swing foot from the stance foot when it lands [rad].
         target: CoM when the step ends, from the foot that lands.
-        pivot_limits: How far the pivot may stand behind, ahead and beside the middle of the sole [m].
+        pivot_limits: How far the pivot may stand behind, ahead and beside its place in the sole [m].
     """
     tc = shape.time_constant
     c, s = math.cosh(shape.duration / tc), math.sinh(shape.duration / tc)

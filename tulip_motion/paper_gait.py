@@ -42,7 +42,7 @@ class Rocking:
             end: CoM at the end.
             time_constant: Tc [s].
             duration: Of each of the two halves [s].
-            other: Middle of the other foot's sole.
+            other: Pivot of the other foot.
         """
         pairs = [rocking_zmps(a, b, time_constant, duration) for a, b in zip(start, end, strict=True)]
         self._zmps = [(pairs[0][half], pairs[1][half]) for half in (0, 1)]
@@ -144,7 +144,7 @@ class PaperGait:
 
         Args:
             start: CoM, from the stance foot.
-            other: Middle of the swing foot's sole, from the stance foot's.
+            other: Pivot of the swing foot, from the stance foot's.
             wanted: Velocity to walk with, or None to stop.
             passed: Duration of what came before [s]; the rest of the tick belongs to this step.
         """
@@ -154,7 +154,7 @@ class PaperGait:
         self.velocity = self._limited(wanted or (0.0, 0.0, 0.0))
         self.step_count += 1
         forward, left, turn = (value * p.step_time for value in self.velocity)
-        # The velocity is that of the ankles; the soles' middles, ahead of them, move sideways when the robot turns.
+        # The velocity is that of the ankles; the pivots, ahead of them, move sideways when the robot turns.
         way = forward, left + turn * p.zmp_forward
         target = periodic_state(self._shape, side.other, self._width, way)
         limits = (p.zmp_limit_heel, p.zmp_limit_toe, p.zmp_limit_side - abs(p.paper_zmp_inward))
@@ -190,7 +190,7 @@ class PaperGait:
         return forward, left, turn
 
     def _frame(self, foot: Footstep) -> Pose2D:
-        """Return the middle of a sole."""
+        """Return the pivot of a foot, with its yaw."""
         p = self._parameters
         x, y = sole_point(foot, p.zmp_forward, p.paper_zmp_inward)
         return Pose2D(x, y, foot.pose.yaw)

@@ -58,7 +58,7 @@ class MotionParameters:
     paper_lift_time: float = 0.08  # [s] the foot takes to rise to swing_height, and to come down
     paper_settle_time: float = 0.1  # [s] from rest to the mirrored motion, and back; with 0 it falls after 10-25 s
     paper_zmp_inward: float = 0.03  # [m] pivot from the middle of the sole towards the other foot: it sways less
-    paper_max_speed: float = 0.3  # [m/s] forward and backward
+    paper_max_speed: float = 0.4  # [m/s] forward and backward; it also walked at 0.5
     paper_max_turn_rate: float = 0.4  # [rad/s] every foot lands turned by a whole step's turn: toes come together
 
     # Kick
