@@ -37,6 +37,19 @@ class FootMotion:
 
 
 @dataclass(frozen=True)
+class ComMotion:
+    """Planned horizontal motion of the CoM in odom.
+
+    Attributes:
+        position, velocity, acceleration: (2,) [m], [m/s], [m/s^2].
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True)
 class Reference:
     """What the gait wants now, in odom.
 
@@ -47,6 +60,7 @@ class Reference:
         zmp, dcm: (2,) planned [m].
         torso_yaw, torso_yaw_rate: [rad], [rad/s].
         phase: Progress of the step or kick, 0 to 1.
+        com: What the CoM follows in open loop; without it, it is led by the feedback of the ZMP.
     """
 
     support: Support
@@ -57,6 +71,7 @@ class Reference:
     torso_yaw: float
     torso_yaw_rate: float
     phase: float
+    com: ComMotion | None = None
 
 
 def support_on(side: Side) -> Support:

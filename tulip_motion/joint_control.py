@@ -17,19 +17,28 @@ class JointGains:
     def __init__(self, parameters: MotionParameters) -> None:
         """Lay the gains of both legs out once, as they are needed every tick."""
         p = parameters
-        stance = np.array([p.stance_stiffness, p.stance_damping])
-        swing = np.array([p.swing_stiffness, p.swing_damping])
-        self._of_support = {
-            Support.DOUBLE: np.hstack([stance, stance]),
-            Support.LEFT: np.hstack([stance, swing]),
-            Support.RIGHT: np.hstack([swing, stance]),
-        }
+        self._closed_loop = _by_support(
+            np.array([p.stance_stiffness, p.stance_damping]), np.array([p.swing_stiffness, p.swing_damping])
+        )
+        self._open_loop = _by_support(
+            np.array([p.open_stance_stiffness, p.open_stance_damping]),
+            np.array([p.open_swing_stiffness, p.open_swing_damping]),
+        )
         self.limp: tuple[Array, Array] = (np.zeros(12), np.tile(np.array(p.limp_damping), len(Side)))
 
-    def of(self, support: Support) -> tuple[Array, Array]:
+    def of(self, support: Support, open_loop: bool = False) -> tuple[Array, Array]:
         """Return (12,) stiffness [N m/rad] and (12,) damping [N m s/rad] for a support."""
-        gains = self._of_support[support]
+        gains = (self._open_loop if open_loop else self._closed_loop)[support]
         return gains[0], gains[1]
+
+
+def _by_support(stance: Array, swing: Array) -> dict[Support, Array]:
+    """Return (2, 12) gains of both legs from the (2, 6) gains of one."""
+    return {
+        Support.DOUBLE: np.hstack([stance, stance]),
+        Support.LEFT: np.hstack([stance, swing]),
+        Support.RIGHT: np.hstack([swing, stance]),
+    }
 
 
 def feedback(stiffness: Array, damping: Array, error: Array, error_rate: Array) -> Array:

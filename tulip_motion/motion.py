@@ -31,6 +31,7 @@ from tulip_motion.inverse_kinematics import InverseKinematics, TaskTarget, orien
 from tulip_motion.joint_control import JointGains, feedback
 from tulip_motion.kick import Kick
 from tulip_motion.lipm import time_constant
+from tulip_motion.paper_gait import PaperGait
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import reach
 from tulip_motion.stabilizer import Balance, stabilize
@@ -68,13 +69,16 @@ class Motion:
         self._command = WalkCommand(0, WalkMode.STAND)
         self._mode = MotionMode.STAND
         self._reason = ""
-        self._gait: Walking | Kick | None = None
+        self._gait: Walking | PaperGait | Kick | None = None
         self._steps_before = 0
         self._started = False
         self._sequence = 0
         self._stamp = 0
         self._acceleration = np.zeros(3)
         self._height = 0.0
+        self._standing_on: Footstep | None = None
+        self._com_planned = np.zeros(2)
+        self._com_planned_velocity = np.zeros(2)
         self._left_weight = 0.5
         self._distance = 0.0
         self._torques = np.zeros((2, 12))
@@ -88,10 +92,12 @@ class Motion:
         """Take a new command; it holds until the next.
 
         Raises:
-            ValueError: if a velocity or goal is not finite.
+            ValueError: if a velocity or goal is not finite, or the gait cannot go to goals.
         """
         if not all(math.isfinite(value) for value in command.velocity):
             raise ValueError(f"walk velocity is {command.velocity}; expected finite numbers")
+        if command.mode is WalkMode.GO and self._parameters.gait == "paper":
+            raise ValueError("walk mode is GO; the paper's gait takes velocities only: choose gait dcm or mode WALK")
         goal = (command.goal.x, command.goal.y, command.goal.yaw)
         if not all(math.isfinite(value) for value in goal):
             raise ValueError(f"walk goal is {goal}; expected finite numbers")
@@ -102,8 +108,8 @@ class Motion:
         """What somebody should know, in words: a command that was clipped, a posture that could not be reached."""
         if self._mode in (MotionMode.LIMP, MotionMode.FALLEN):
             return ()
-        clipped = self._gait.course.note if isinstance(self._gait, Walking) else ""
-        return (*((clipped,) if clipped else ()), *self._kinematics.notes)
+        gait = self._gait.notes if isinstance(self._gait, Walking | PaperGait) else ()
+        return (*gait, *self._kinematics.notes)
 
     def start_kick(self, goal: KickGoal) -> str:
         """Begin a kick; return "" or the reason why not."""
@@ -128,6 +134,7 @@ class Motion:
         if self._mode in (MotionMode.LIMP, MotionMode.FALLEN):
             return self._limp(estimate)
         reference = self._reference = self._advance_gait(estimate)
+        self._plan_com(reference)
         balance = self._balance = self._stabilize(estimate, reference)
         self._left_weight = 1.0 - balance.right_share
         return self._track(estimate, reference, balance)
@@ -157,11 +164,11 @@ class Motion:
             self._mode,
             reference.support if reference else Support.NONE,
             reference.phase if reference else 0.0,
-            self._steps_before + (self._gait.step_count if isinstance(self._gait, Walking) else 0),
+            self._steps_before + (self._gait.step_count if isinstance(self._gait, Walking | PaperGait) else 0),
             estimate.com,
-            np.array([*estimate.com[:2], self._height]),
+            np.array([*self._com_planned, self._height]) if reference else np.full(3, np.nan),
             estimate.com_velocity,
-            np.array([*((planned - estimate.com[:2]) * self._omega), 0.0]),
+            np.array([*self._com_planned_velocity, 0.0]) if reference else np.full(3, np.nan),
             dcm,
             planned,
             estimate.zmp,
@@ -190,6 +197,7 @@ class Motion:
         """Begin to stand where the robot is."""
         self._kinematics.reset(estimate.base_rotation, estimate.base_position, estimate.joint_positions)
         self._height = float(estimate.com[2])
+        self._com_planned = estimate.com[:2].copy()
         self._acceleration = np.zeros(3)
         self._left_weight = 0.5
         self._started = True
@@ -207,12 +215,15 @@ class Motion:
         elif wanted is WalkMode.LIMP:
             self._mode, self._reason = MotionMode.LIMP, "limp on request"
         elif self._gait is not None and self._gait.finished:
-            if isinstance(self._gait, Walking):
+            if isinstance(self._gait, Walking | PaperGait):
                 self._steps_before += self._gait.step_count
             self._gait = None
             self._mode = MotionMode.STAND
         elif self._mode is MotionMode.STAND and self._wants_to_step(estimate):
-            self._gait = Walking(p, self._reach, self._feet(), self._middle())
+            if p.gait == "paper":
+                self._gait = PaperGait(p, self._feet(), self._middle())
+            else:
+                self._gait = Walking(p, self._reach, self._feet(), self._middle())
             self._mode = MotionMode.WALK
 
     def _wants_to_step(self, estimate: Estimate) -> bool:
@@ -223,7 +234,7 @@ class Motion:
         else:
             away = wish is not None
         dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
-        return away or must_step(p, self._feet(), (float(dcm[0]), float(dcm[1])))
+        return away or (p.gait == "dcm" and must_step(p, self._feet(), (float(dcm[0]), float(dcm[1]))))
 
     def _wish(self) -> Wish:
         """Return what the present command asks of the walk."""
@@ -235,7 +246,7 @@ class Motion:
     def _advance_gait(self, estimate: Estimate) -> Reference:
         dt = self._parameters.control_period
         dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
-        if isinstance(self._gait, Walking):
+        if isinstance(self._gait, Walking | PaperGait):
             landed = [planar_pose(sole) for sole in estimate.soles]
             reference = self._gait.tick(dt, self._wish(), (dcm[0], dcm[1]), landed, estimate.loads)
             self._anchor(self._gait.feet)
@@ -266,8 +277,19 @@ class Motion:
                 self._distance += 0.5 * math.hypot(foot.pose.x - old.x, foot.pose.y - old.y)
                 self._estimator.anchor(foot)
 
+    def _plan_com(self, reference: Reference) -> None:
+        """Keep the CoM that belongs to the plan: given, or the one that its DCM leads, c' = (xi - c) / Tc."""
+        if reference.com is not None:
+            self._com_planned, self._com_planned_velocity = reference.com.position, reference.com.velocity
+            return
+        share = 1.0 - math.exp(-self._omega * self._parameters.control_period)
+        self._com_planned = self._com_planned + share * (reference.dcm - self._com_planned)
+        self._com_planned_velocity = self._omega * (reference.dcm - self._com_planned)
+
     def _stabilize(self, estimate: Estimate, reference: Reference) -> Balance:
-        dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
+        # In open loop nothing is corrected: the plan's own DCM leaves the plan's ZMP.
+        measured = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
+        dcm = measured if reference.com is None else reference.dcm
         other = None
         if reference.support is Support.DOUBLE:
             foot = reference.other
@@ -284,31 +306,25 @@ class Motion:
         dt = p.control_period
         climb = min(max(p.com_height - self._height, -HEIGHT_RATE * dt), HEIGHT_RATE * dt)
         self._height += climb
-        x, y, z = estimate.com.tolist()
-        vx, vy, vz = estimate.com_velocity.tolist()
-        com_target = np.array((x, y, self._height))
-        com_rate = np.array((vx, vy, climb / dt))
+        rate = climb / dt
+        if reference.com is None:
+            com, velocity = estimate.com, estimate.com_velocity
+            self._standing_on = None
+        else:
+            com, velocity = reference.com.position, reference.com.velocity
+            self._stand_on(reference.stance)
+        com_target = np.array((com[0], com[1], self._height))
+        com_rate = np.array((velocity[0], velocity[1], rate))
         torso = rotation_z(reference.torso_yaw)
         torso_rate = np.array((0.0, 0.0, reference.torso_yaw_rate))
         kinematics.update_jacobian(reference.stance.side)
         kinematics.solve_velocity(TaskTarget(com_target, com_rate, torso, torso_rate, reference.other))
 
-        foot = reference.other
-        acceleration = np.array(
-            (
-                self._omega**2 * (x - balance.zmp[0]),
-                self._omega**2 * (y - balance.zmp[1]),
-                p.height_stiffness * (self._height - z) - p.height_damping * (vz - climb / dt),
-                *self._torso_acceleration(estimate, torso, reference.torso_yaw_rate),
-                *foot.acceleration.tolist(),
-                *(0.0, 0.0, foot.yaw_acceleration),
-            )
-        )
+        acceleration = self._task_acceleration(estimate, reference, balance, torso, rate)
         self._acceleration = acceleration[:3].copy()
-        generalized = kinematics.solve_acceleration(acceleration)
-        torques = feedforward(kinematics, kinematics.velocity, generalized, *self._sharing(reference, balance))
+        torques = self._feedforward(acceleration, reference, balance)
         kinematics.integrate(dt, reference.stance.pose)
-        stiffness, damping = self._gains.of(reference.support)
+        stiffness, damping = self._gains.of(reference.support, reference.com is not None)
         positions, velocities = kinematics.joint_positions.copy(), kinematics.joint_velocities.copy()
         self._torques[0] = feedback(
             stiffness, damping, positions - estimate.joint_positions, velocities - estimate.joint_velocities
@@ -324,11 +340,56 @@ class Motion:
         stiffness, damping = p.torso_stiffness, p.torso_damping
         return stiffness * ex - damping * wx, stiffness * ey - damping * wy, stiffness * ez + damping * (yaw_rate - wz)
 
+    def _stand_on(self, stance: Footstep) -> None:
+        """Move the desired posture as a whole to a new stance foot, so that its joints take no notice of the change."""
+        if stance == self._standing_on:
+            return
+        self._standing_on = stance
+        kinematics = self._kinematics
+        q, data = kinematics.configuration, kinematics.data
+        pin.framesForwardKinematics(self._model, data, q)
+        sole = data.oMf[kinematics.sole_frames[stance.side]]
+        anchored = pin.SE3(rotation_z(stance.pose.yaw), np.array([stance.pose.x, stance.pose.y, 0.0]))
+        base = anchored * sole.inverse() * data.oMi[1]
+        q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
+
+    def _task_acceleration(
+        self, estimate: Estimate, reference: Reference, balance: Balance, torso: Array, height_rate: float
+    ) -> Array:
+        """Return (12,) of the CoM, the torso and the other foot: planned, or led by what is measured."""
+        p, foot, com = self._parameters, reference.other, reference.com
+        swing = (*foot.acceleration.tolist(), 0.0, 0.0, foot.yaw_acceleration)
+        if com is not None:
+            return np.array((*com.acceleration.tolist(), 0.0, 0.0, 0.0, 0.5 * foot.yaw_acceleration, *swing))
+        x, y, z = estimate.com.tolist()
+        return np.array(
+            (
+                self._omega**2 * (x - balance.zmp[0]),
+                self._omega**2 * (y - balance.zmp[1]),
+                p.height_stiffness * (self._height - z)
+                - p.height_damping * (float(estimate.com_velocity[2]) - height_rate),
+                *self._torso_acceleration(estimate, torso, reference.torso_yaw_rate),
+                *swing,
+            )
+        )
+
+    def _feedforward(self, acceleration: Array, reference: Reference, balance: Balance) -> Array:
+        """Return (12,) tau_ff: eq. (14) in full, its term of gravity alone, or none."""
+        kinematics, kind = self._kinematics, self._parameters.feedforward
+        if kind == "none":
+            return np.zeros(12)
+        sharing = self._sharing(reference, balance)
+        if kind == "gravity":
+            return feedforward(kinematics, np.zeros(18), np.zeros(18), *sharing)
+        generalized = kinematics.solve_acceleration(acceleration)
+        return feedforward(kinematics, kinematics.velocity, generalized, *sharing)
+
     def _sharing(self, reference: Reference, balance: Balance) -> tuple[float, tuple[Array, Array] | None]:
         """Return alpha, and the aim points of the ZMP on the left and right foot in odom [m] or None, eq. (15)."""
         p = self._parameters
         if p.weight_sharing == "distance":
-            return distance_share(self._estimate.com, *self._kinematics.sole_positions), None
+            com = self._estimate.com if reference.com is None else reference.com.position
+            return distance_share(com, *self._kinematics.sole_positions), None
         if balance.right_share in (0.0, 1.0):
             return balance.right_share, None  # one foot takes all of it, wherever it does
         foot = reference.other

@@ -3,6 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from math import cosh
+
+from tulip_motion.lipm import time_constant
+
+CHOICES = {
+    "gait": ("dcm", "paper"),
+    "paper_swing": ("sat", "smooth"),
+    "feedforward": ("full", "gravity", "none"),
+    "weight_sharing": ("zmp", "distance"),
+}
+"""Values of the parameters that are words."""
 
 
 @dataclass(frozen=True)
@@ -14,7 +25,8 @@ class MotionParameters:
 
     control_period: float = 0.004  # [s] one tick of the driver
 
-    # Gait
+    # Gait: "dcm" walks best, with feedback; "paper" is eqs. (3)-(4) in open loop
+    gait: str = "dcm"
     com_height: float = 0.71  # [m] above the ground; leaves the knees bent enough for long steps
     step_time: float = 0.40  # [s] whole step, double support included
     double_support_time: float = 0.06  # [s] of it the ZMP moves from the old to the new stance foot
@@ -53,6 +65,14 @@ class MotionParameters:
     outer_excess_weight: float = 2.0  # [1] DCM error beyond the landing foot, where no next step can catch it
     max_swing_speed: float = 2.4  # [m/s] of the foot
 
+    # The paper's gait. Eq. (4) as printed is "sat" with both times 0: the foot rises at 4 m/s, and lands at 2 c'
+    paper_swing: str = "sat"  # "sat": eq. (4), its speed limited by paper_lift_time; "smooth": quintics up and down
+    paper_lift_time: float = 0.08  # [s] the foot takes to rise to swing_height, and to come down
+    paper_settle_time: float = 0.1  # [s] from rest to the mirrored motion, and back; with 0 it falls after 10-25 s
+    paper_zmp_inward: float = 0.03  # [m] pivot from the middle of the sole towards the other foot: it sways less
+    paper_max_speed: float = 0.4  # [m/s] forward and backward; it also walked at 0.5
+    paper_max_turn_rate: float = 0.4  # [rad/s] every foot lands turned by a whole step's turn: toes come together
+
     # Kick
     kick_shift_time: float = 0.8  # [s] the weight moves onto the stance foot
     kick_lift_time: float = 0.35  # [s] up and back
@@ -82,7 +102,9 @@ class MotionParameters:
     clik_gain_orientation: float = 20.0  # [1/s] K_o
     clik_damping: float = 1e-6  # keeps the solve finite at the straight knee
 
-    # Feedforward, eq. (15): "zmp" shares the weight by the commanded ZMP about the common centre of pressure;
+    # Feedforward, eq. (14): "full", or "gravity" as in 2012, at rest without acceleration, or "none"
+    feedforward: str = "full"
+    # Eq. (15): "zmp" shares the weight by the commanded ZMP about the common centre of pressure;
     # "distance" is the printed form, alpha from the CoM's distances to the feet, with which the robot does not walk
     weight_sharing: str = "zmp"
 
@@ -91,6 +113,11 @@ class MotionParameters:
     stance_damping: tuple[float, ...] = (3.0, 8.0, 8.0, 8.0, 2.0, 0.4)  # [N m s/rad]
     swing_stiffness: tuple[float, ...] = (150.0, 300.0, 300.0, 300.0, 60.0, 20.0)  # [N m/rad]
     swing_damping: tuple[float, ...] = (2.0, 6.0, 6.0, 5.0, 0.6, 0.15)  # [N m s/rad]; Kd dt / I must stay < 2
+    # The open-loop gait has the joints alone to hold it
+    open_stance_stiffness: tuple[float, ...] = (300.0, 1000.0, 1000.0, 1000.0, 600.0, 300.0)  # [N m/rad]
+    open_stance_damping: tuple[float, ...] = (5.0, 15.0, 15.0, 12.0, 2.0, 0.4)  # [N m s/rad]
+    open_swing_stiffness: tuple[float, ...] = (200.0, 500.0, 500.0, 400.0, 80.0, 20.0)  # [N m/rad]
+    open_swing_damping: tuple[float, ...] = (2.0, 7.0, 7.0, 6.0, 0.6, 0.15)  # [N m s/rad]
     limp_damping: tuple[float, ...] = (2.0, 4.0, 4.0, 4.0, 0.6, 0.15)  # [N m s/rad] lets the robot sink, not drop
 
     # Falling
@@ -105,8 +132,26 @@ class MotionParameters:
             raise ValueError(
                 f"double_support_time is {self.double_support_time} s; expected less than step_time, {self.step_time} s"
             )
-        if self.weight_sharing not in ("zmp", "distance"):
-            raise ValueError(f"weight_sharing is {self.weight_sharing!r}; expected zmp or distance")
+        for name, choices in CHOICES.items():
+            if getattr(self, name) not in choices:
+                raise ValueError(f"{name} is {getattr(self, name)!r}; expected {' or '.join(choices)}")
+        for name in ("paper_lift_time", "paper_settle_time"):
+            value = getattr(self, name)
+            if value < 0.0 or 2.0 * value > self.step_time:
+                raise ValueError(f"{name} is {value} s; expected 0 to half of step_time, {self.step_time} s")
+        if self.paper_swing == "smooth" and self.paper_lift_time == 0.0:
+            raise ValueError("paper_lift_time is 0 s; expected > 0 with paper_swing smooth")
+        if self.gait == "paper":
+            # The swing foot mirrors the CoM, which comes near the stance foot in the middle of the step.
+            pivots = self.stance_width - 2.0 * self.paper_zmp_inward
+            near = self.stance_width - pivots * (
+                1.0 - 1.0 / cosh(0.5 * self.step_time / time_constant(self.com_height))
+            )
+            if near < self.min_foot_distance:
+                raise ValueError(
+                    f"step_time {self.step_time} s brings the feet of gait paper to {near:.3f} m, closer than"
+                    f" min_foot_distance, {self.min_foot_distance} m"
+                )
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, tuple) and (len(value) != 6 or min(value) < 0.0):

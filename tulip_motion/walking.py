@@ -53,6 +53,11 @@ class Walking:
             StepAdjustment(parameters, reach, self._time_constant, -1.0 if side is Side.LEFT else 1.0) for side in Side
         ]
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was taken off the command, in words."""
+        return (self.course.note,) if self.course.note else ()
+
     def tick(
         self,
         dt: float,
