@@ -7,7 +7,7 @@ import math
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.footsteps import Footstep, centre_beside, foot_beside, plan_footsteps
 from tulip_motion.parameters import MotionParameters
-from tulip_motion.reach import Reach, Velocity
+from tulip_motion.reach import Reach, Velocity, step_time
 
 Wish = Velocity | Pose2D | None
 """A velocity (forward [m/s], left [m/s], turning [rad/s]), a goal for the middle between the feet in odom, or stop."""
@@ -25,6 +25,8 @@ class Course:
         self._reach = reach
         self._heading: float | None = None
         self.velocity: Velocity = STILL
+        self.step_time = parameters.step_time
+        """Duration of the next step, double support included [s]."""
         self.note = ""
         """What was taken off the last command, in words, or ""."""
 
@@ -42,7 +44,8 @@ class Course:
         if isinstance(wish, Pose2D):
             self.note = ""  # a far goal is meant to be walked to as fast as the robot can
         self.velocity = self._smoothed(possible)
-        steps = plan_footsteps(straight, self.velocity, p.step_time, p.stance_width, PREVIEW_STEPS)
+        self.step_time = step_time(p, self.velocity[0])
+        steps = plan_footsteps(straight, self.velocity, self.step_time, p.stance_width, PREVIEW_STEPS)
         if isinstance(wish, Pose2D) and self._is_near(wish, straight):
             steps = self._last_steps(wish, straight)
         self._heading = steps[0].pose.yaw
@@ -85,12 +88,12 @@ class Course:
         distance = math.hypot(way.x, way.y)
         turn = math.atan2(way.y, way.x) if distance > p.goal_holonomic_distance else way.yaw
         # From this speed the robot comes to rest on the way that is left, slowing down by the permitted change a step.
-        brake = math.sqrt(2.0 * p.max_speed_change / p.step_time * distance) * 0.7
+        brake = math.sqrt(2.0 * p.max_speed_change / self.step_time * distance) * 0.7
         fastest = min(limits.forward, brake)
         if distance > p.goal_holonomic_distance:
-            return fastest * max(math.cos(turn), 0.0), 0.0, turn / (2.0 * p.step_time)
-        scale = min(fastest / distance, 1.0 / p.step_time) if distance > 0.0 else 0.0
-        return scale * way.x, scale * way.y, turn / (2.0 * p.step_time)
+            return fastest * max(math.cos(turn), 0.0), 0.0, turn / (2.0 * self.step_time)
+        scale = min(fastest / distance, 1.0 / self.step_time) if distance > 0.0 else 0.0
+        return scale * way.x, scale * way.y, turn / (2.0 * self.step_time)
 
     def _is_near(self, goal: Pose2D, stance: Footstep) -> bool:
         """Return whether the other foot can be put on its place at the goal with the next step, slowly enough."""
@@ -99,9 +102,9 @@ class Course:
         foot = stance.pose.inverse() @ foot_beside(goal, stance.side.other, p.stance_width).pose
         outward = abs(foot.y)
         return (
-            abs(to_goal.x) <= (abs(self.velocity[0]) + p.max_speed_change) * p.step_time
-            and abs(to_goal.y) <= 2.0 * (abs(self.velocity[1]) + p.max_speed_change) * p.step_time
-            and abs(to_goal.yaw) <= p.max_turn_change * p.step_time
+            abs(to_goal.x) <= (abs(self.velocity[0]) + p.max_speed_change) * self.step_time
+            and abs(to_goal.y) <= 2.0 * (abs(self.velocity[1]) + p.max_speed_change) * self.step_time
+            and abs(to_goal.yaw) <= p.max_turn_change * self.step_time
             and self._reach.nearest <= outward <= self._reach.farthest
             and (foot.y > 0.0) is (stance.side.other.value == 0)
         )

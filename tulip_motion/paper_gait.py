@@ -84,7 +84,7 @@ class PaperGait:
         self.notes: tuple[str, ...] = ()
         self._zmp = zmp
         self._shape = StepShape(
-            p.step_time,
+            p.paper_step_time,
             p.com_height,
             p.swing_height,
             p.paper_lift_time,
@@ -155,7 +155,7 @@ class PaperGait:
         self._time -= passed
         self.velocity = self._limited(wanted or (0.0, 0.0, 0.0))
         self.step_count += 1
-        forward, left, turn = (value * p.step_time for value in self.velocity)
+        forward, left, turn = (value * p.paper_step_time for value in self.velocity)
         # The velocity is that of the ankles; the pivots, ahead of them, move sideways when the robot turns.
         way = forward, left + turn * p.zmp_forward
         target = periodic_state(self._shape, side.other, self._width, way)

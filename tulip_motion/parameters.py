@@ -28,7 +28,8 @@ class MotionParameters:
     # Gait: "dcm" walks best, with feedback; "paper" is eqs. (3)-(4) in open loop
     gait: str = "dcm"
     com_height: float = 0.71  # [m] above the ground; leaves the knees bent enough for long steps
-    step_time: float = 0.40  # [s] whole step, double support included
+    step_time: float = 0.36  # [s] whole step in place, double support included: quick steps catch pushes
+    step_time_growth: float = 0.22  # [s/(m/s)] and longer steps need more time: 0.49 s at 0.6 m/s
     double_support_time: float = 0.06  # [s] of it the ZMP moves from the old to the new stance foot
     first_shift_time: float = 0.5  # [s] the ZMP moves over the first stance foot
     stop_shift_time: float = 0.6  # [s] the ZMP moves back between the feet after the last step
@@ -66,6 +67,7 @@ class MotionParameters:
     max_swing_speed: float = 2.4  # [m/s] of the foot
 
     # The paper's gait. Eq. (4) as printed is "sat" with both times 0: the foot rises at 4 m/s, and lands at 2 c'
+    paper_step_time: float = 0.45  # [s]
     paper_swing: str = "sat"  # "sat": eq. (4), its speed limited by paper_lift_time; "smooth": quintics up and down
     paper_lift_time: float = 0.08  # [s] the foot takes to rise to swing_height, and to come down
     paper_settle_time: float = 0.1  # [s] from rest to the mirrored motion, and back; with 0 it falls after 10-25 s
@@ -137,20 +139,22 @@ class MotionParameters:
                 raise ValueError(f"{name} is {getattr(self, name)!r}; expected {' or '.join(choices)}")
         for name in ("paper_lift_time", "paper_settle_time"):
             value = getattr(self, name)
-            if value < 0.0 or 2.0 * value > self.step_time:
-                raise ValueError(f"{name} is {value} s; expected 0 to half of step_time, {self.step_time} s")
+            if value < 0.0 or 2.0 * value > self.paper_step_time:
+                raise ValueError(
+                    f"{name} is {value} s; expected 0 to half of paper_step_time, {self.paper_step_time} s"
+                )
         if self.paper_swing == "smooth" and self.paper_lift_time == 0.0:
             raise ValueError("paper_lift_time is 0 s; expected > 0 with paper_swing smooth")
         if self.gait == "paper":
             # The swing foot mirrors the CoM, which comes near the stance foot in the middle of the step.
             pivots = self.stance_width - 2.0 * self.paper_zmp_inward
             near = self.stance_width - pivots * (
-                1.0 - 1.0 / cosh(0.5 * self.step_time / time_constant(self.com_height))
+                1.0 - 1.0 / cosh(0.5 * self.paper_step_time / time_constant(self.com_height))
             )
             if near < self.min_foot_distance:
                 raise ValueError(
-                    f"step_time {self.step_time} s brings the feet of gait paper to {near:.3f} m, closer than"
-                    f" min_foot_distance, {self.min_foot_distance} m"
+                    f"paper_step_time {self.paper_step_time} s brings the feet of gait paper to {near:.3f} m,"
+                    f" closer than min_foot_distance, {self.min_foot_distance} m"
                 )
         for field in fields(self):
             value = getattr(self, field.name)

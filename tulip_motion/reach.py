@@ -91,8 +91,19 @@ def reach(parameters: MotionParameters, robot: Robot) -> Reach:
         p.min_foot_distance,
         farthest,
         turn,
-        min(p.max_speed_forward, stride / p.step_time),
-        min(p.max_speed_backward, stride / p.step_time),
+        fastest_stride(p.max_speed_forward, stride, p),
+        fastest_stride(p.max_speed_backward, stride, p),
         min(p.max_speed_sideways, (farthest - p.stance_width) / (2.0 * p.step_time)),
         min(p.max_turn_rate, turn / (2.0 * p.step_time)),
     )
+
+
+def step_time(parameters: MotionParameters, speed: float) -> float:
+    """Return the duration of a whole step [s] at a speed forward or backward [m/s]."""
+    return parameters.step_time + parameters.step_time_growth * abs(speed)
+
+
+def fastest_stride(speed: float, stride: float, parameters: MotionParameters) -> float:
+    """Return the speed [m/s], or the one at which steps are as long as the stride [m] if that is less."""
+    p, growth = parameters, max(parameters.step_time_growth, 1e-9)
+    return min(speed, (math.sqrt(p.step_time**2 + 4.0 * growth * stride) - p.step_time) / (2.0 * growth))

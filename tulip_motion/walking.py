@@ -123,13 +123,13 @@ class Walking:
         aim = sole_point(stance, p.zmp_forward, p.zmp_inward)
         steps = self.course.next_steps(stance, wish)
         self._target = self._nominal = steps[0].pose
-        swing_time = p.step_time - p.double_support_time
+        swing_time = self.course.step_time - p.double_support_time
         self._landing_time = self._planned_landing_time = shift_time + swing_time
         self._aim = aim
         times, zmps = [0.0, shift_time, self._landing_time], [self._zmp, aim, aim]
         for step in steps:
             aim = sole_point(step, p.zmp_forward, p.zmp_inward)
-            times += [times[-1] + p.double_support_time, times[-1] + p.step_time]
+            times += [times[-1] + p.double_support_time, times[-1] + self.course.step_time]
             zmps += [aim, aim]
         middle = ((zmps[-1][0] + zmps[-3][0]) / 2.0, (zmps[-1][1] + zmps[-3][1]) / 2.0)
         self._plan = DcmPlan([*times, times[-1] + p.stop_shift_time], [*zmps, middle], self._time_constant)

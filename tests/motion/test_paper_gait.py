@@ -245,7 +245,7 @@ def test_feet_stay_apart_and_the_zmp_inside_the_stance_sole(velocity: Velocity) 
         foot = reference.other
         away = reference.stance.pose.inverse().transform((float(foot.position[0]), float(foot.position[1])))[1]
         # A turn brings the ankles nearer by what the pivots, 0.04 m ahead, swing about them.
-        assert abs(away) > P.min_foot_distance - 2.0 * P.zmp_forward * abs(math.sin(velocity[2] * P.step_time))
+        assert abs(away) > P.min_foot_distance - 2.0 * P.zmp_forward * abs(math.sin(velocity[2] * P.paper_step_time))
 
 
 @pytest.mark.parametrize("velocity", [(0.2, 0.0, 0.0), (-0.2, 0.0, 0.0), (0.0, 0.1, 0.0), (0.1, 0.05, 0.3)])
@@ -312,7 +312,7 @@ def test_what_is_measured_does_not_change_the_plan() -> None:
         ({"paper_lift_time": 0.3}, "paper_lift_time is 0.3 s"),
         ({"paper_settle_time": -0.1}, "paper_settle_time"),
         ({"paper_swing": "smooth", "paper_lift_time": 0.0}, "expected > 0 with paper_swing smooth"),
-        ({"gait": "paper", "step_time": 0.9}, "closer than min_foot_distance"),
+        ({"gait": "paper", "paper_step_time": 0.9}, "closer than min_foot_distance"),
     ],
 )
 def test_parameters_refuse_what_the_gait_cannot_do(changes: dict[str, object], message: str) -> None:
