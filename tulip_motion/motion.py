@@ -29,10 +29,12 @@ from tulip_motion.interface import (
 from tulip_motion.inverse_kinematics import InverseKinematics, TaskTarget, orientation_error, rotation_z
 from tulip_motion.joint_control import JointGains, feedback
 from tulip_motion.kick import Kick
+from tulip_motion.learning_file import LearningFile
 from tulip_motion.lipm import time_constant
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.stabilizer import Balance, stabilize
 from tulip_motion.state_estimator import Estimate, StateEstimator, planar_pose
+from tulip_motion.step_learning import StepLearner
 from tulip_motion.walking import Walking
 
 Array = NDArray[np.float64]
@@ -74,7 +76,11 @@ class Motion:
         self._height = 0.0
         self._left_weight = 0.5
         self._distance = 0.0
-        self._torques = np.zeros((2, 12))
+        self._torques = np.zeros((3, 12))
+        self._learner: StepLearner | None = None
+        if p.learning != "none":
+            self._learner = StepLearner(p, self._effort_limits)
+            self._learning_file = LearningFile(p, robot, self._learner)
 
     @property
     def mode(self) -> MotionMode:
@@ -159,8 +165,20 @@ class Motion:
             kinematics.joint_velocities.copy(),
             self._torques[0],
             self._torques[1],
+            self._torques[2],
             reason=self._reason,
+            notes=self._notes(),
         )
+
+    def save_learning(self) -> None:
+        """Write what was learned since the last time to `learning_file`, if there is one."""
+        if self._learner is not None:
+            self._learning_file.save()
+
+    def _notes(self) -> tuple[str, ...]:
+        if self._learner is None:
+            return ()
+        return tuple(note for note in (self._learner.note, self._learning_file.note) if note)
 
     def _feet(self) -> tuple[Footstep, Footstep]:
         left, right = self._estimator.anchors
@@ -250,6 +268,8 @@ class Motion:
     def _track(self, estimate: Estimate, reference: Reference, balance: Balance) -> JointCommand:
         """Turn the reference into joint angles, eq. (10), and torques, eqs. (12)-(15)."""
         p, kinematics = self._parameters, self._kinematics
+        if self._learner is not None:
+            self._learn(self._learner, estimate, reference)  # before the desired angles move on
         step = HEIGHT_RATE * p.control_period
         climb = min(max(p.com_height - self._height, -step), step)
         self._height += climb
@@ -293,7 +313,30 @@ class Motion:
         )
         self._torques[1] = torques
         return self._send(
-            kinematics.joint_positions.copy(), kinematics.joint_velocities.copy(), torques, stiffness, damping
+            kinematics.joint_positions.copy(),
+            kinematics.joint_velocities.copy(),
+            torques + self._torques[2],
+            stiffness,
+            damping,
+        )
+
+    def _learn(self, learner: StepLearner, estimate: Estimate, reference: Reference) -> None:
+        """Set tau_ILC of eq. (12) from the errors of the desired angles that are in force now."""
+        if not isinstance(self._gait, Walking):
+            learner.rest()
+            self._torques[2] = 0.0
+            return
+        kinematics, gait = self._kinematics, self._gait
+        self._torques[2] = learner.tick(
+            reference.stance.side,
+            reference.support,
+            reference.phase,
+            gait.step_count,
+            gait.velocity if self._command.mode is WalkMode.WALK else None,
+            kinematics.joint_positions
+            - estimate.joint_positions
+            - self._parameters.learning_delay * estimate.joint_velocities,
+            kinematics.joint_velocities - estimate.joint_velocities,
         )
 
     def _sharing(self, reference: Reference, balance: Balance) -> tuple[float, tuple[Array, Array] | None]:
@@ -312,6 +355,8 @@ class Motion:
     def _limp(self, estimate: Estimate) -> JointCommand:
         stiffness, damping = self._gains.limp
         self._torques[:] = 0.0
+        if self._learner is not None:
+            self._learner.rest()
         self._acceleration = np.zeros(3)
         return self._send(estimate.joint_positions, np.zeros(12), np.zeros(12), stiffness, damping)
 
