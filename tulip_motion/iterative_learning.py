@@ -139,9 +139,9 @@ class WaveformLaw:
 
     W(t) <- Q (W(t) + gain (K_P e(t + lead) + K_D e'(t + lead))): what the feedback had to add in one step, the next
     ones add in advance, as in feedback error learning (Kawato 1987). The PD combination inverts the joint's own
-    closed loop up to its inertia; `lead` makes up for that and for the delay from measuring to acting. Q is a Gaussian over time, of zero phase
-    since the whole step is known, which runs on into the steps before and after; it takes from W what is too fast for
-    the model of the joint that K_P and K_D stand for, and lets W forget what is no longer confirmed.
+    closed loop up to its inertia; `lead` makes up for that and for the delay from measuring to acting. Q is a Gaussian
+    over time, of zero phase since the whole step is known, which runs on into the steps before and after; it takes from
+    W what is too fast for that inverse, and lets W forget what is no longer confirmed.
 
     A step teaches its own side with `gain` and the other with a share of it: legs differ a little, and with a
     share below 1 both errors go to zero.

@@ -88,8 +88,7 @@ def save(path: Path, owner: Mapping[str, object], situations: Mapping[Key, Situa
             owner=np.array(json.dumps(owner)),
             keys=np.array(keys, dtype=np.int64).reshape(-1, 3),
             memories=np.array([situation.memory for situation in found]),
-            baselines=np.array([situation.baseline for situation in found]),
-            baseline_steps=np.array([situation.baseline_steps for situation in found], dtype=np.int64),
+            baselines=np.array([situation.baselines for situation in found]),
         )
     os.replace(temporary, path)
 
@@ -112,23 +111,22 @@ def load(path: Path, owner: Mapping[str, object], shape: tuple[int, ...]) -> dic
             if version != VERSION:
                 raise LearningFileError(f"it is of version {version}; expected {VERSION}")
             theirs = json.loads(str(file["owner"]))
-            keys, memories = file["keys"], file["memories"]
-            baselines, steps = file["baselines"], file["baseline_steps"]
+            keys, memories, baselines = file["keys"], file["memories"], file["baselines"]
     except FileNotFoundError:
         raise
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise LearningFileError(f"it is damaged ({error})") from error
     _check_owner(theirs, owner)
     count = len(keys)
-    expected = {"keys": (count, 3), "memories": (count, *shape), "baselines": (count,), "baseline_steps": (count,)}
-    for (name, wanted), array in zip(expected.items(), (keys, memories, baselines, steps), strict=True):
+    expected = {"keys": (count, 3), "memories": (count, *shape), "baselines": (count, 2)}
+    for (name, wanted), array in zip(expected.items(), (keys, memories, baselines), strict=True):
         if array.shape != wanted and count:
             raise LearningFileError(f"its {name} have shape {array.shape}; expected {wanted}")
-        if not np.isfinite(array).all() or (name.startswith("baseline") and (array < 0).any()):
+        if not np.isfinite(array).all() or (name == "baselines" and (array < 0.0).any()):
             raise LearningFileError(f"its {name} are not all finite and in range")
     return {
-        (int(key[0]), int(key[1]), int(key[2])): Situation(memory.copy(), float(baseline), int(number))
-        for key, memory, baseline, number in zip(keys, memories, baselines, steps, strict=True)
+        (int(key[0]), int(key[1]), int(key[2])): Situation(memory.copy(), baseline.copy())
+        for key, memory, baseline in zip(keys, memories, baselines, strict=True)
     }
 
 

@@ -333,6 +333,7 @@ class Motion:
             reference.phase,
             gait.step_count,
             gait.velocity if self._command.mode is WalkMode.WALK else None,
+            estimate.loads[reference.stance.side.other] > 0.25 * self._parameters.contact_force,
             kinematics.joint_positions
             - estimate.joint_positions
             - self._parameters.learning_delay * estimate.joint_velocities,

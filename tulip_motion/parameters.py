@@ -86,7 +86,10 @@ class MotionParameters:
     learning_file: str = ""  # read at the start if it exists, written when the robot stops walking; "" keeps nothing
     learning_bound: float = 0.15  # share of a joint's torque limit that learning may use
     learning_margin: float = 1.2  # joint error by that without learning: above it learning does harm
-    learning_patience: int = 4  # steps running above the margin, then it switches itself off; a push spoils two
+    learning_patience: int = 3  # steps running on one foot above the margin, then it switches itself off
+    learning_top_speed: float = (
+        0.45  # [m/s] forward or back; near the gait's limit toes scuff, and learning feeds on it
+    )
     learning_delay: float = 0.001  # [s] joint angles are that old when they are read: the middle of 0-2 ms
     learning_gain: float = 0.5  # waveform: share of a step's feedback torque that the next steps add in advance
     learning_mirror_share: float = 0.7  # waveform: of the gain, for the other side; below 1, since legs differ

@@ -19,8 +19,9 @@ Key = tuple[int, int, int]
 SPEED_BIN = 0.2  # [m/s] forward; steps whose speeds round to the same bin are one motion
 SIDE_BIN = 0.1  # [m/s]
 TURN_BIN = 0.5  # [rad/s]
-BASELINE_STEPS = 2  # without torque, one on each side: what the error is without learning
 LEAST_PHASE = 0.75  # a step that ended earlier was another motion
+IN_THE_AIR = (0.25, 0.8)  # phase in which the swing foot is in the air; what touches then is a toe that scuffs
+PAUSE = 4  # steps without torque after one that scuffed
 SLEW_TIME = 0.04  # [s] from zero to the greatest torque: fades in and out, slower than no waveform that passes Q
 
 
@@ -45,18 +46,12 @@ class Situation:
 
     Attributes:
         memory: Of the law.
-        baseline: Mean square joint error of the steps that went without torque [rad^2].
-        baseline_steps: How many these were.
+        baselines: (2,) mean square joint error of the first steps on each side, which go without torque [rad^2]; 0
+            before there was one.
     """
 
     memory: Array
-    baseline: float = 0.0
-    baseline_steps: int = 0
-
-    @property
-    def ready(self) -> bool:
-        """Whether it is known how large the error is without torque."""
-        return self.baseline_steps >= BASELINE_STEPS
+    baselines: Array
 
 
 class StepLearner:
@@ -97,7 +92,7 @@ class StepLearner:
         self._torque = np.zeros(12)
         self._zero = np.zeros(12)
         self._walking = False
-        self._worse_steps = 0
+        self._worse_steps = [0, 0]
         self.rest()
 
     @property
@@ -112,7 +107,7 @@ class StepLearner:
             self._walking = False
         self._step = -1
         self._steps_seen = 0
-        self._ticks = 0
+        self._ticks = self._touches = self._pause = 0
         self._key: Key | None = None
         self._key_before: Key | None = None
         self._rows: Array | None = None
@@ -124,6 +119,7 @@ class StepLearner:
         phase: float,
         step: int,
         velocity: Velocity | None,
+        touching: bool,
         error: Array,
         error_rate: Array,
     ) -> Array:
@@ -135,6 +131,7 @@ class StepLearner:
             phase: Of the step, 0 to 1.
             step: Number of the step; another one means that a new step has begun.
             velocity: That the step walks with; None if the step is no ordinary one. Looked at when a step begins.
+            touching: Whether the foot that is not the stance foot carries weight.
             error: (12,) e, desired minus measured joint angles [rad].
             error_rate: (12,) e' [rad/s].
         """
@@ -151,6 +148,8 @@ class StepLearner:
             self._phases[k] = phase
             self._supports[k] = support
         self._ticks = k + 1
+        if touching and IN_THE_AIR[0] < phase < IN_THE_AIR[1]:
+            self._touches += 1
         wanted = self._zero
         if self._rows is not None:
             node = min(int(phase * self._nodes), self._nodes - 1)
@@ -160,14 +159,16 @@ class StepLearner:
         return self._torque
 
     def _begin_step(self, side: Side, step: int, velocity: Velocity | None) -> None:
-        self._side, self._step, self._ticks = side, step, 0
+        self._side, self._step, self._ticks, self._touches = side, step, 0, 0
         self._steps_seen += 1
-        self._key_before, self._key = self._key, None if velocity is None else key_of(velocity, side)
+        ordinary = velocity is not None and abs(velocity[0]) <= self._parameters.learning_top_speed
+        self._key_before, self._key = self._key, key_of(velocity, side) if velocity and ordinary else None
         self._rows = None
-        if self._key is None or self._steps_seen == 1 or self.note:
+        self._pause = max(self._pause - 1, 0)
+        if self._key is None or self._steps_seen == 1 or self.note or self._pause:
             return
         situation = self.situations.get(self._key)
-        if situation is not None and situation.ready:
+        if situation is not None and situation.baselines[side] > 0.0:
             self._rows = self._law.playable(situation.memory, side)
 
     def _end_step(self) -> None:
@@ -177,15 +178,19 @@ class StepLearner:
             return
         if self._key_before != mirror_key(key) or self._phases[ticks - 1] < LEAST_PHASE:
             return
+        if self._touches > 1:
+            # The ground held the foot: not an error of the joints' torques, and nothing to add up.
+            self._pause = PAUSE + 1
+            return
         errors, rates = self._errors[:ticks, 0], self._errors[:ticks, 1]
         square = float(np.vdot(errors, errors)) / errors.size
         situation = self.situations.get(key)
         if situation is None:
-            situation = self.situations[key] = Situation(np.zeros(self._law.shape))
-        if not situation.ready:
-            situation.baseline += (square - situation.baseline) / (situation.baseline_steps + 1)
-            situation.baseline_steps += 1
-        elif self._rows is not None and self._is_worse(square, situation.baseline):
+            situation = self.situations[key] = Situation(np.zeros(self._law.shape), np.zeros(2))
+        if not situation.baselines[self._side]:
+            situation.baselines[self._side] = square
+        elif self._rows is not None and self._is_worse(square, float(situation.baselines[self._side])):
+            situation.memory *= 0.5
             return
         gains = self._gains[self._supports[:ticks]]
         neighbour = self.situations.get(mirror_key(key))
@@ -200,17 +205,16 @@ class StepLearner:
         self.changed = True
 
     def _is_worse(self, square: float, baseline: float) -> bool:
-        """Count a step against the baseline; return whether learning has just been switched off."""
-        p = self._parameters
+        """Return whether a step with torque was worse than the baseline; after some running, switch learning off."""
+        p, side = self._parameters, self._side
         if square <= p.learning_margin**2 * baseline:
-            self._worse_steps = 0
+            self._worse_steps[side] = 0
             return False
-        self._worse_steps += 1
-        if self._worse_steps < p.learning_patience:
-            return False
-        self.note = (
-            f"learning ({p.learning}) switched off: joint errors were {1e3 * square**0.5:.1f} mrad RMS, without"
-            f" learning {1e3 * baseline**0.5:.1f} mrad, more than {p.learning_margin:g} times that in"
-            f" {self._worse_steps} steps running"
-        )
+        self._worse_steps[side] += 1
+        if self._worse_steps[side] >= p.learning_patience:
+            self.note = (
+                f"learning ({p.learning}) switched off: joint errors were {1e3 * square**0.5:.1f} mrad RMS, without"
+                f" learning {1e3 * baseline**0.5:.1f} mrad, more than {p.learning_margin:g} times that in"
+                f" {self._worse_steps[side]} steps running on one foot"
+            )
         return True
