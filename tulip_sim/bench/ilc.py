@@ -113,7 +113,8 @@ def summarize(rows: list[Row]) -> list[str]:
                 seen = np.array([ratios(row, rows, MEASURED) for row in upright])
                 true = np.array([ratios(row, rows, TRUE) for row in upright])
                 cells = [
-                    f"| {robot} | {law} | {seen[:, 0].mean():.1f} mrad | {seen[:, 1].mean():.2f}, {seen[:, 2].max():.2f}"
+                    f"| {robot} | {law} | {seen[:, 0].mean():.1f} mrad"
+                    f" | {seen[:, 1].mean():.2f}, {seen[:, 2].max():.2f}"
                     f" | {true[:, 1].mean():.2f}, {true[:, 2].max():.2f}"
                     f" | {int((true[:, 2] <= 0.5).sum())} of {len(own)} "
                 ]
