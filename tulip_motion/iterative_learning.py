@@ -76,7 +76,7 @@ class Law(Protocol):
             phases: (ticks,) of the step.
             rates: (ticks, 12) e' [rad/s], order of LEG_JOINTS.
             feedback: (ticks, 12) K_P e + K_D e' [N m], order of LEG_JOINTS.
-            neighbour: (N, 12, ...) memory of the steps before and after, on the other side, or None if unknown.
+            neighbour: Memory of the situation of the steps before and after, or None if unknown.
         """
 
 
@@ -174,7 +174,8 @@ class WaveformLaw:
         if side is Side.RIGHT:
             needed = mirrored(needed)
         for taught, share in ((side, 1.0), (side.other, self._share)):
-            self._teach(memory[taught], share * needed, neighbour)
+            beside = None if neighbour is None else neighbour[taught.other]
+            self._teach(memory[taught], share * needed, beside)
 
     def _teach(self, waveform: Array, needed: Array, neighbour: Array | None) -> None:
         margin = self._margin

@@ -58,9 +58,13 @@ class StepLearner:
     """Watches joint errors step by step and gives tau_ILC of eq. (12).
 
     A step teaches when the one before had the same velocity, it is not the first of a walk, and it ended by landing.
-    Each coarse velocity has a memory of its own. Its first two steps go without torque: their error is
-    the baseline. When the error of steps with torque stays above the baseline by a margin for some steps, learning
-    switches itself off for good.
+    Steps that start, stop, kick or change speed are other motions, and so are those whose toe scuffs: what the ground
+    does to a foot is no error of its torques, and adding it up made the robot limp and fall. After a scuff the
+    torque pauses. Above `learning_top_speed`, where toes scuff at every change, nothing is learned or given.
+
+    Each coarse velocity has a memory of its own. Its first step on each foot goes without torque: its error is the
+    baseline of that foot. A step with torque that is worse than its baseline by a margin halves the memory instead of
+    teaching; after some of them running on one foot, learning switches itself off for good.
     """
 
     def __init__(self, parameters: MotionParameters, effort_limits: Array) -> None:
@@ -200,7 +204,7 @@ class StepLearner:
             self._phases[:ticks],
             rates,
             gains[:, 0] * errors + gains[:, 1] * rates,
-            None if neighbour is None else neighbour.memory[self._side.other % len(neighbour.memory)],
+            None if neighbour is None else neighbour.memory,
         )
         self.changed = True
 
