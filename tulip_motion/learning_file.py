@@ -115,7 +115,7 @@ def load(path: Path, owner: Mapping[str, object], shape: tuple[int, ...]) -> dic
     except FileNotFoundError:
         raise
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise LearningFileError(f"it is damaged ({error})") from error
+        raise LearningFileError(f"it is damaged or no .npz file ({type(error).__name__})") from error
     _check_owner(theirs, owner)
     count = len(keys)
     expected = {"keys": (count, 3), "memories": (count, *shape), "baselines": (count, 2)}
