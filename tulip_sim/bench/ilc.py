@@ -143,7 +143,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
         axes.set_xscale("log")
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("true joint error, RMS of a step [mrad]")
-    figure.axes[-1].legend()
+    figure.axes[0].legend()
     figure.savefig(path, dpi=110)
 
 
