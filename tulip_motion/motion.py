@@ -30,12 +30,14 @@ from tulip_motion.interface import (
 from tulip_motion.inverse_kinematics import InverseKinematics, TaskTarget, orientation_error, rotation_z
 from tulip_motion.joint_control import JointGains, feedback
 from tulip_motion.kick import Kick
+from tulip_motion.learning_file import LearningFile
 from tulip_motion.lipm import time_constant
 from tulip_motion.paper_gait import PaperGait
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import reach
 from tulip_motion.stabilizer import Balance, stabilize
 from tulip_motion.state_estimator import Estimate, StateEstimator, planar_pose
+from tulip_motion.step_learning import StepLearner
 from tulip_motion.walking import Walking, must_step
 
 Array = NDArray[np.float64]
@@ -81,7 +83,11 @@ class Motion:
         self._com_planned_velocity = np.zeros(2)
         self._left_weight = 0.5
         self._distance = 0.0
-        self._torques = np.zeros((2, 12))
+        self._torques = np.zeros((3, 12))
+        self._learner: StepLearner | None = None
+        if p.learning != "none":
+            self._learner = StepLearner(p, self._effort_limits)
+            self._learning_file = LearningFile(p, robot, self._learner)
 
     @property
     def mode(self) -> MotionMode:
@@ -109,7 +115,8 @@ class Motion:
         if self._mode in (MotionMode.LIMP, MotionMode.FALLEN):
             return ()
         gait = self._gait.notes if isinstance(self._gait, Walking | PaperGait) else ()
-        return (*gait, *self._kinematics.notes)
+        learning = () if self._learner is None else (self._learner.note, self._learning_file.note)
+        return (*gait, *self._kinematics.notes, *(note for note in learning if note))
 
     def start_kick(self, goal: KickGoal) -> str:
         """Begin a kick; return "" or the reason why not."""
@@ -180,9 +187,15 @@ class Motion:
             kinematics.joint_velocities.copy(),
             self._torques[0],
             self._torques[1],
+            self._torques[2],
             reason=self._reason,
             notes=self.notes,
         )
+
+    def save_learning(self) -> None:
+        """Write what was learned since the last time to `learning_file`, if there is one."""
+        if self._learner is not None:
+            self._learning_file.save()
 
     def _feet(self) -> tuple[Footstep, Footstep]:
         left, right = self._estimator.anchors
@@ -303,6 +316,8 @@ class Motion:
     def _track(self, estimate: Estimate, reference: Reference, balance: Balance) -> JointCommand:
         """Turn the reference into joint angles, eq. (10), and torques, eqs. (12)-(15)."""
         p, kinematics = self._parameters, self._kinematics
+        if self._learner is not None:
+            self._learn(self._learner, estimate, reference)  # before the desired angles move on
         dt = p.control_period
         climb = min(max(p.com_height - self._height, -HEIGHT_RATE * dt), HEIGHT_RATE * dt)
         self._height += climb
@@ -330,7 +345,7 @@ class Motion:
             stiffness, damping, positions - estimate.joint_positions, velocities - estimate.joint_velocities
         )
         self._torques[1] = torques
-        return self._send(positions, velocities, torques, stiffness, damping)
+        return self._send(positions, velocities, torques + self._torques[2], stiffness, damping)
 
     def _torso_acceleration(self, estimate: Estimate, torso: Array, yaw_rate: float) -> tuple[float, float, float]:
         """Return the (3,) angular acceleration [rad/s^2], odom axes, that brings the torso to its attitude."""
@@ -373,6 +388,26 @@ class Motion:
             )
         )
 
+    def _learn(self, learner: StepLearner, estimate: Estimate, reference: Reference) -> None:
+        """Set tau_ILC of eq. (12) from the errors of the desired angles that are in force now."""
+        if not isinstance(self._gait, Walking):
+            learner.rest()
+            self._torques[2] = 0.0
+            return
+        kinematics, gait = self._kinematics, self._gait
+        self._torques[2] = learner.tick(
+            reference.stance.side,
+            reference.support,
+            reference.phase,
+            gait.step_count,
+            gait.course.velocity if self._command.mode is WalkMode.WALK else None,
+            estimate.loads[reference.stance.side.other] > 0.25 * self._parameters.contact_force,
+            kinematics.joint_positions
+            - estimate.joint_positions
+            - self._parameters.learning_delay * estimate.joint_velocities,
+            kinematics.joint_velocities - estimate.joint_velocities,
+        )
+
     def _feedforward(self, acceleration: Array, reference: Reference, balance: Balance) -> Array:
         """Return (12,) tau_ff: eq. (14) in full, its term of gravity alone, or none."""
         kinematics, kind = self._kinematics, self._parameters.feedforward
@@ -403,6 +438,8 @@ class Motion:
     def _limp(self, estimate: Estimate) -> JointCommand:
         stiffness, damping = self._gains.limp
         self._torques[:] = 0.0
+        if self._learner is not None:
+            self._learner.rest()
         self._acceleration = np.zeros(3)
         return self._send(estimate.joint_positions, np.zeros(12), np.zeros(12), stiffness, damping)
 

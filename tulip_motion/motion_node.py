@@ -46,7 +46,7 @@ class MotionNode(ComponentNode):
         super().__init__("motion")
         self._settings = self.load(MotionParameters())
         self._kick: _RunningKick | None = None
-        self.begin_anew()
+        self._begin()
         self._legs = self.sender(topics.LEG_COMMAND)
         self._odometry = self.sender(topics.ODOMETRY)
         self._state = self.sender(topics.MOTION_STATE)
@@ -65,13 +65,23 @@ class MotionNode(ComponentNode):
 
     def begin_anew(self) -> None:
         """Make the core; a kick that was under way has failed."""
+        self._motion.save_learning()
+        self._begin()
+        if self._kick is not None:
+            self._kick.done.set_result((False, "time began anew during the kick"))
+            self._kick = None
+
+    def _begin(self) -> None:
+        self._notes: tuple[str, ...] = ()
         self._motion = Motion(self._settings, load_robot())
         self._sensors = SameStamp("joint_states", "imu", "foot_forces")
         self._tick = 0
         self._walking_until = 0
-        if self._kick is not None:
-            self._kick.done.set_result((False, "time began anew during the kick"))
-            self._kick = None
+
+    def destroy_node(self) -> None:
+        """Keep what was learned, and end."""
+        self._motion.save_learning()
+        super().destroy_node()
 
     def _on_sensor(self, name: str, message: Any) -> None:
         complete = self._sensors.add(name, stamp_of(message), message)
@@ -96,6 +106,11 @@ class MotionNode(ComponentNode):
         self._odometry.publish(odometry_to_message(odometry))
         self._tf.publish(body_transforms(odometry))
         self._state.publish(motion_state_to_message(state, odometry.distance))
+        for note in set(state.notes) - set(self._notes):
+            self.health.count("notes", note)
+        self._notes = state.notes
+        if state.mode is MotionMode.STAND:
+            self._motion.save_learning()
         if self._kick is None:
             return
         if state.mode is MotionMode.KICK:

@@ -12,6 +12,7 @@ CHOICES = {
     "paper_swing": ("sat", "smooth"),
     "feedforward": ("full", "gravity", "none"),
     "weight_sharing": ("zmp", "distance"),
+    "learning": ("none", "adaptive", "waveform"),
 }
 """Values of the parameters that are words."""
 
@@ -122,6 +123,29 @@ class MotionParameters:
     open_swing_damping: tuple[float, ...] = (2.0, 7.0, 7.0, 6.0, 0.6, 0.15)  # [N m s/rad]
     limp_damping: tuple[float, ...] = (2.0, 4.0, 4.0, 4.0, 0.6, 0.15)  # [N m s/rad] lets the robot sink, not drop
 
+    # Iterative learning over steps, eqs. (16)-(18)
+    learning: str = "none"  # "none", "adaptive" (the paper's law) or "waveform" (a torque over the step)
+    learning_file: str = ""  # read at the start if it exists, written when the robot stops walking; "" keeps nothing
+    learning_bound: float = 0.15  # share of a joint's torque limit that learning may use
+    learning_margin: float = 1.2  # joint error by that without learning: above it learning does harm
+    learning_patience: int = 3  # steps running on one foot above the margin, then it switches itself off
+    learning_top_speed: float = (
+        0.45  # [m/s] forward or back; near the gait's limit toes scuff, and learning feeds on it
+    )
+    learning_delay: float = 0.001  # [s] joint angles are that old when they are read: the middle of 0-2 ms
+    learning_gain: float = 0.5  # waveform: share of a step's feedback torque that the next steps add in advance
+    learning_mirror_share: float = 0.7  # waveform: of the gain, for the other side; below 1, since legs differ
+    learning_lead: float = (
+        0.016  # [s] waveform: from the torque to its effect; two ticks are delay, two the joint's lag
+    )
+    learning_smoothing: float = 0.008  # [s] waveform: standard deviation of Q, which halves 23 Hz
+    learning_beta: float = 10.0  # [s/rad] adaptive: tanh(beta e') for the sign of e'; velocity noise is 0.02 rad/s
+    learning_gamma_rate: float = 50.0  # [s^2/rad^2] adaptive: Gamma_11 by K_D
+    learning_gamma_cross: float = 0.0  # [s/rad] adaptive: Gamma_12 = Gamma_21 by K_D
+    learning_gamma_sign: float = 1.0  # adaptive: Gamma_22 by K_D
+    learning_leak: float = 0.02  # adaptive: share of theta forgotten each step
+    learning_damping_bound: float = 2.0  # adaptive: theta_1 + beta theta_2 at most, by K_D
+
     # Falling
     fall_tilt: float = 0.7  # [rad] beyond it no step can save the robot
     upright_tilt: float = 0.25  # [rad] below it a limp robot may stand up again
@@ -156,7 +180,30 @@ class MotionParameters:
                     f"paper_step_time {self.paper_step_time} s brings the feet of gait paper to {near:.3f} m,"
                     f" closer than min_foot_distance, {self.min_foot_distance} m"
                 )
+        self._check_learning()
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, tuple) and (len(value) != 6 or min(value) < 0.0):
                 raise ValueError(f"{field.name} is {value}; expected six numbers >= 0, hip yaw to ankle roll")
+
+    def _check_learning(self) -> None:
+        for name, low, high in (
+            ("learning_bound", 0.0, 1.0),
+            ("learning_gain", 0.0, 1.0),
+            ("learning_mirror_share", 0.0, 1.0),
+            ("learning_lead", 0.0, self.step_time),
+            ("learning_smoothing", 0.0, self.step_time / 6.0),
+            ("learning_delay", 0.0, 0.1),
+            ("learning_leak", 0.0, 1.0),
+            ("learning_damping_bound", 0.0, 10.0),
+        ):
+            if not low <= getattr(self, name) <= high:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected {low:g} to {high:g}")
+        if self.learning_margin <= 1.0 or self.learning_patience < 1 or self.learning_beta <= 0.0:
+            raise ValueError(
+                f"learning_margin is {self.learning_margin}, learning_patience {self.learning_patience},"
+                f" learning_beta {self.learning_beta}; expected > 1, >= 1 and > 0"
+            )
+        gamma = (self.learning_gamma_rate, self.learning_gamma_sign, self.learning_gamma_cross)
+        if min(gamma[:2]) < 0.0 or gamma[0] * gamma[1] < gamma[2] ** 2:
+            raise ValueError(f"learning_gamma_rate, _sign, _cross are {gamma}; expected a positive semidefinite Gamma")

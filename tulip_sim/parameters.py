@@ -75,6 +75,7 @@ class WorldParameters:
     """The physical world. Ranges are drawn from once, when a world is made, by its seed."""
 
     friction: tuple[float, float] = (0.6, 1.0)  # range of the friction coefficient on the carpet
+    mass_scale: float = 1.0  # all masses and inertias by those of the robot file, that motion control does not know of
     mass_spread: float = 0.05  # each link's mass and inertia: +- this share
     joint_friction: tuple[float, float] = (0.0, 0.01)  # range of each joint's dry friction, share of its torque limit
     joint_friction_speed: float = 1.0  # [rad/s] over which dry friction builds up: a step of 1 ms needs it smooth
@@ -103,7 +104,14 @@ class WorldParameters:
             raise ValueError(f"friction begins at {self.friction[0]}; expected > 0")
         if not 0.0 <= self.mass_spread < 1.0:
             raise ValueError(f"mass_spread is {self.mass_spread}; expected in [0, 1)")
-        for name in ("ball_mass", "ball_stiffness", "net_stiffness", "solver_iterations", "joint_friction_speed"):
+        for name in (
+            "mass_scale",
+            "ball_mass",
+            "ball_stiffness",
+            "net_stiffness",
+            "solver_iterations",
+            "joint_friction_speed",
+        ):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} is {getattr(self, name)}; expected > 0")
         for name in ("ball_rolling_deceleration", "ball_damping", "net_damping"):

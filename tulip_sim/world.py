@@ -78,7 +78,8 @@ class World:
             bodies.add_poles(self._client, self.field)
         self._ball = bodies.add_ball(self._client, self.field.ball_radius, self.friction, p)
         self._keeper = None if scenario.keeper is None else bodies.add_keeper(self._client, scenario.keeper)
-        scale = physics_rng.uniform(1.0 - p.mass_spread, 1.0 + p.mass_spread, len(self.robot.links))
+        spread = physics_rng.uniform(1.0 - p.mass_spread, 1.0 + p.mass_spread, len(self.robot.links))
+        scale = p.mass_scale * spread
         self._body, self._index = bodies.add_robot(self._client, self.robot, scale)
         self._joint_indices = [self._index[name] for name in self.robot.joint_names]
         self._foot_links = tuple(self._index[sole.link] for sole in self.robot.soles)

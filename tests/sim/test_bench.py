@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from tulip_sim.bench import kick, trial, walk
+from tulip_sim.bench import ilc, kick, trial, walk
 from tulip_sim.bench.runner import Bench, Row, run, save, write_results
 
-BENCHES = (trial.BENCH, walk.BENCH, kick.BENCH)
+BENCHES = (trial.BENCH, walk.BENCH, kick.BENCH, ilc.BENCH)
 
 TRIAL_ROWS: list[Row] = [
     {
@@ -131,3 +131,46 @@ def test_all_benches_have_names_of_their_own_and_independent_trials() -> None:
     assert len({bench.name for bench in BENCHES}) == len(BENCHES)
     for bench in BENCHES:
         assert len(set(bench.trials)) == len(bench.trials) > 0
+
+
+def ilc_rows() -> list[Row]:
+    curves = {"none": [4.0] * 60, "waveform": [4.0] * 10 + [1.0] * 50, "adaptive": [4.0] * 10 + [3.0] * 50}
+    return [
+        {
+            "robot": "nominal",
+            "learning": law,
+            "seed": 1,
+            "upright": True,
+            "greatest learned torque [N m]": 2.0,
+            "notes": "",
+            ilc.MEASURED: curve,
+            ilc.TRUE: curve,
+        }
+        for law, curve in curves.items()
+    ]
+
+
+def test_learning_curves_are_compared_with_the_same_seed_without_learning() -> None:
+    text = "\n".join(ilc.summarize(ilc_rows()))
+    assert "| nominal | waveform | 4.0 mrad | 0.25, 0.25 | 0.25, 0.25 | 1 of 1 |" in text
+    assert "| nominal | adaptive | 4.0 mrad | 0.75, 0.75 | 0.75, 0.75 | 0 of 1 |" in text
+
+
+def test_learning_curves_are_drawn_and_shown_on_the_page(tmp_path: Path) -> None:
+    folder = tmp_path / "results"
+    save(ilc.BENCH, ilc_rows(), folder)
+    assert ilc.BENCH.draw is not None
+    ilc.BENCH.draw(ilc_rows(), folder / "ilc.png")
+    assert (folder / "ilc.png").read_bytes().startswith(b"\x89PNG")
+    write_results(BENCHES, folder, tmp_path / "results.md")
+    assert "![Iterative learning control](results/ilc.png)" in (tmp_path / "results.md").read_text()
+
+
+@pytest.mark.sim
+def test_a_short_walk_gives_an_error_for_each_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ilc, "STEPS", 6)
+    row = ilc.measure("heavier, with friction", "waveform", 1)
+    assert row["upright"]
+    assert len(row[ilc.TRUE]) == len(row[ilc.MEASURED]) == 6
+    assert 4.0 < row[ilc.TRUE][3] < 12.0  # [mrad] before learning acts
+    assert row["greatest learned torque [N m]"] > 0.5

@@ -88,6 +88,14 @@ def test_masses_are_spread_by_the_seed_within_the_range(make_world: MakeWorld) -
     assert 0.95 <= min(ratios) < 0.98 < 1.02 < max(ratios) <= 1.05
 
 
+def test_all_masses_and_inertias_are_scaled_alike(make_world: MakeWorld) -> None:
+    world = make_world(FAR, replace(EXACT, mass_scale=1.1))
+    for link in world.robot.links:
+        info = pybullet.getDynamicsInfo(world._body, world._index[link.name], physicsClientId=world._client)
+        assert info[0] == pytest.approx(1.1 * link.mass)
+        np.testing.assert_allclose(info[2], 1.1 * np.array(link.inertia), rtol=1e-6)
+
+
 def test_robot_starts_where_the_scenario_says_with_soles_on_the_ground(make_world: MakeWorld) -> None:
     world = make_world(FAR, EXACT)
     truth = world.truth()
@@ -321,6 +329,7 @@ def test_uneven_start_postures_are_refused() -> None:
         ("friction", (0.0, 1.0)),
         ("friction", (1.0, 0.5)),
         ("mass_spread", 1.0),
+        ("mass_scale", 0.0),
         ("sensor_delay", (2, 1)),
         ("ball_mass", 0.0),
         ("net_damping", -1.0),
