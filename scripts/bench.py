@@ -18,10 +18,10 @@ from rich.markdown import Markdown
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
-from tulip_sim.bench import kick, trial, walk
+from tulip_sim.bench import kick, odometry, trial, walk
 from tulip_sim.bench.runner import Row, run, save, write_results
 
-BENCHES = {module.BENCH.name: module.BENCH for module in (trial, walk, kick)}
+BENCHES = {module.BENCH.name: module.BENCH for module in (trial, walk, kick, odometry)}
 DOCS = _environment.ROOT / "docs"
 
 
@@ -50,6 +50,8 @@ def main(
 
         rows = run(bench, workers, done)
     save(bench, rows, DOCS / "results")
+    if bench.draw is not None:
+        bench.draw(rows, DOCS / "results" / f"{bench.name}.png")
     write_results(list(BENCHES.values()), DOCS / "results", DOCS / "results.md")
     if json_path is not None:
         json_path.write_text(json.dumps(rows, indent=1) + "\n")

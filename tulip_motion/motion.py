@@ -13,6 +13,7 @@ from tulip_description.model import floating_model
 from tulip_description.planar import Pose2D
 from tulip_description.robot import HEAD_JOINTS, LEG_JOINTS, Robot
 from tulip_description.robot_io import JointCommand, Sensors
+from tulip_motion.fall_detection import FallDetector
 from tulip_motion.feedforward import distance_share, feedforward
 from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import FootMotion, Reference, sole_point
@@ -30,6 +31,7 @@ from tulip_motion.inverse_kinematics import InverseKinematics, TaskTarget, orien
 from tulip_motion.joint_control import JointGains, feedback
 from tulip_motion.kick import Kick
 from tulip_motion.lipm import time_constant
+from tulip_motion.odometry import DeadReckoning
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.stabilizer import Balance, stabilize
 from tulip_motion.state_estimator import Estimate, StateEstimator, planar_pose
@@ -73,7 +75,8 @@ class Motion:
         self._acceleration = np.zeros(3)
         self._height = 0.0
         self._left_weight = 0.5
-        self._distance = 0.0
+        self._dead_reckoning = DeadReckoning(p)
+        self._falls = FallDetector(p)
         self._torques = np.zeros((2, 12))
 
     @property
@@ -128,7 +131,11 @@ class Motion:
             pin.Quaternion(estimate.base_rotation).coeffs(),
             rotation_z(-yaw) @ estimate.base_velocity,
             estimate.base_rotation.T @ estimate.angular_velocity,
-            self._distance,
+            self._dead_reckoning.distance,
+            self._dead_reckoning.pose_covariance(
+                self._stamp, estimate.base_position, yaw, self._mode is MotionMode.FALLEN
+            ),
+            self._dead_reckoning.twist_covariance(),
         )
 
     def state(self) -> MotionState:
@@ -177,18 +184,21 @@ class Motion:
         self._height = float(estimate.com[2])
         self._acceleration = np.zeros(3)
         self._left_weight = 0.5
+        self._dead_reckoning.begin(self._stamp, estimate.base_position[:2])
         self._started = True
 
     def _change_mode(self, estimate: Estimate) -> None:
         p, wanted = self._parameters, self._command.mode
-        upright = estimate.tilt < p.upright_tilt
         if self._mode is MotionMode.FALLEN or self._mode is MotionMode.LIMP:
-            if upright and wanted is not WalkMode.LIMP and min(estimate.loads) > p.contact_force:
+            if self._may_stand(estimate) and wanted is not WalkMode.LIMP:
                 self._estimator.restart()
                 self._mode, self._reason, self._gait, self._started = MotionMode.STAND, "", None, False
-        elif estimate.tilt > p.fall_tilt:
-            self._mode = MotionMode.FALLEN
-            self._reason = f"fell: the torso leans {math.degrees(estimate.tilt):.0f} deg"
+            return
+        dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
+        fall = self._falls.is_falling(estimate.base_rotation, estimate.angular_velocity, dcm, estimate.soles)
+        if fall:
+            self._mode, self._reason = MotionMode.FALLEN, fall
+            self._dead_reckoning.fall()
         elif wanted is WalkMode.LIMP:
             self._mode, self._reason = MotionMode.LIMP, "limp on request"
         elif self._gait is not None and self._gait.finished:
@@ -199,6 +209,13 @@ class Motion:
         elif self._mode is MotionMode.STAND and wanted is WalkMode.WALK:
             self._gait = Walking(p, self._feet(), self._middle())
             self._mode = MotionMode.WALK
+
+    def _may_stand(self, estimate: Estimate) -> bool:
+        p = self._parameters
+        if self._mode is MotionMode.LIMP:
+            return estimate.tilt < p.upright_tilt and min(estimate.loads) > p.contact_force
+        height = float(estimate.base_position[2] - min(estimate.soles[:, 2, 3]))
+        return self._falls.is_upright(estimate.base_rotation, estimate.angular_velocity, height, estimate.loads)
 
     def _advance_gait(self, estimate: Estimate) -> Reference:
         dt = self._parameters.control_period
@@ -230,9 +247,9 @@ class Motion:
         """Tell the estimator where the feet stand, and count the way."""
         before = self._estimator.anchors
         if (feet[0].pose, feet[1].pose) != tuple(before):
-            for foot, old in zip(feet, list(before), strict=True):
-                # The body moves half as far as a foot does.
-                self._distance += 0.5 * math.hypot(foot.pose.x - old.x, foot.pose.y - old.y)
+            position = self._estimate.base_position[:2]
+            self._dead_reckoning.step(self._stamp, position, before, [foot.pose for foot in feet])
+            for foot in feet:
                 self._estimator.anchor(foot)
 
     def _stabilize(self, estimate: Estimate, reference: Reference) -> Balance:
