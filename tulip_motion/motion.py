@@ -31,7 +31,7 @@ from tulip_motion.inverse_kinematics import InverseKinematics, TaskTarget, orien
 from tulip_motion.joint_control import JointGains, feedback
 from tulip_motion.kick import Kick
 from tulip_motion.lipm import time_constant
-from tulip_motion.odometry import DeadReckoning
+from tulip_motion.odometry import DeadReckoning, StanceTwist
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.stabilizer import Balance, stabilize
 from tulip_motion.state_estimator import Estimate, StateEstimator, planar_pose
@@ -76,6 +76,7 @@ class Motion:
         self._height = 0.0
         self._left_weight = 0.5
         self._dead_reckoning = DeadReckoning(p)
+        self._twist = StanceTwist(p.control_period)
         self._falls = FallDetector(p)
         self._torques = np.zeros((2, 12))
 
@@ -222,9 +223,13 @@ class Motion:
         dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
         if isinstance(self._gait, Walking):
             velocity = self._command.velocity if self._command.mode is WalkMode.WALK else None
-            landed = [planar_pose(sole) for sole in estimate.soles]
+            shift_x, shift_y = self._twist.shift
+            landed = [Pose2D(at.x + shift_x, at.y + shift_y, at.yaw) for at in map(planar_pose, estimate.soles)]
             reference = self._gait.tick(dt, velocity, (dcm[0], dcm[1]), landed, estimate.loads)
             self._anchor(self._gait.feet)
+            if reference.support is not Support.DOUBLE:
+                stance = reference.stance
+                self._twist.update(stance.pose, planar_pose(estimate.soles[stance.side]).yaw, estimate.zmp)
             return reference
         if isinstance(self._gait, Kick):
             reference = self._gait.tick(dt, planar_pose(estimate.soles[self._gait.side]), estimate.loads)
@@ -248,7 +253,8 @@ class Motion:
         before = self._estimator.anchors
         if (feet[0].pose, feet[1].pose) != tuple(before):
             position = self._estimate.base_position[:2]
-            self._dead_reckoning.step(self._stamp, position, before, [foot.pose for foot in feet])
+            self._dead_reckoning.step(self._stamp, position, before, [foot.pose for foot in feet], self._twist.twist)
+            self._twist.restart()
             for foot in feet:
                 self._estimator.anchor(foot)
 

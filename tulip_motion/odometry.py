@@ -8,6 +8,8 @@ errors e = truth - odometry grow like this:
   the base in odom and J the quarter turn. With b in the state, e = (x, y, yaw, b), this is linear and exact in d.
 - Each step adds a slip of its own, in the axes of the foot: a share of the way, more sideways than forward, some
   millimetres for each radian turned, and a little even in place.
+- A stance foot that twists on the ground shifts too. The IMU and the joints show the twist, and the foot pivots about
+  its centre of pressure: `StanceTwist` takes most of the shift off, the rest is a share of the twist.
 - The IMU's tilt error carries over the height of base_link into the position. It does not add up, and the part that
   is fixed to the body is part of where odom was put at the start: it shows by how much the robot has turned since.
 """
@@ -23,10 +25,44 @@ from numpy.typing import NDArray
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.parameters import MotionParameters
 
+TWIST_FILTER = 0.02  # [s] over which the IMU's noise of 1 mrad is smoothed; a step takes twenty times as long
+
 Array = NDArray[np.float64]
 NANOSECOND = 1e-9  # [s]
 YAW, DRIFT = 2, 3
 PLANE = np.ix_((0, 1, 5), (0, 1, 5))  # x, y and yaw among the six of a pose
+
+
+class StanceTwist:
+    """How far the stance foot has moved by twisting on the ground during one step.
+
+    Attributes:
+        shift: (x, y) of the sole in odom since the step began [m]: of the body as well, which stands on it.
+        twist: Of the sole since the step began [rad].
+    """
+
+    def __init__(self, control_period: float) -> None:
+        self._share = min(control_period / TWIST_FILTER, 1.0)
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin a step."""
+        self.shift = (0.0, 0.0)
+        self.twist = 0.0
+
+    def update(self, anchor: Pose2D, yaw: float, pressure: Array) -> None:
+        """Look at the foot in single support.
+
+        Args:
+            anchor: Where the sole was put down, in odom.
+            yaw: Of the sole as the IMU and the joints have it now, in odom [rad].
+            pressure: (2,) centre of pressure in odom [m]; NaN without contact.
+        """
+        turned = self._share * wrap_angle(yaw - anchor.yaw - self.twist)
+        self.twist += turned
+        x, y = anchor.x - float(pressure[0]), anchor.y - float(pressure[1])
+        if math.isfinite(x) and math.isfinite(y):
+            self.shift = (self.shift[0] - turned * y, self.shift[1] + turned * x)
 
 
 class DeadReckoning:
@@ -51,7 +87,9 @@ class DeadReckoning:
         if self._stamp is None:
             self._stamp, self._position = stamp, position.copy()
 
-    def step(self, stamp: int, position: Array, before: Sequence[Pose2D], after: Sequence[Pose2D]) -> None:
+    def step(
+        self, stamp: int, position: Array, before: Sequence[Pose2D], after: Sequence[Pose2D], twist: float = 0.0
+    ) -> None:
         """Add a step: the feet stand anew.
 
         Args:
@@ -59,6 +97,7 @@ class DeadReckoning:
             position: (2,) of base_link in odom [m].
             before: Left and right foot as they stood, in odom.
             after: Left and right foot as they stand now.
+            twist: Of the stance foot on the ground during the step [rad].
         """
         p = self._parameters
         # The body moves half as far as a foot does.
@@ -69,7 +108,7 @@ class DeadReckoning:
         self._stamp, self._position = stamp, position.copy()
         heading = after[0].rotation()
         forward, left = heading.T @ way
-        always = p.odometry_step_noise**2 + (p.odometry_turn_slip * turned) ** 2
+        always = p.odometry_step_noise**2 + (p.odometry_turn_slip * turned) ** 2 + (p.odometry_twist_slip * twist) ** 2
         slip = always + np.array([p.odometry_forward_slip * forward, p.odometry_sideways_slip * left]) ** 2
         self._covariance[:2, :2] += heading @ np.diag(slip) @ heading.T
 

@@ -99,6 +99,7 @@ class MotionParameters:
     odometry_forward_slip: float = 0.003  # share of the way; 0.001 was found on level carpet of friction 0.6 to 1.0
     odometry_sideways_slip: float = 0.006  # share of the way
     odometry_turn_slip: float = 0.001  # [m/rad] a sole that twists on the ground also shifts: 0.3 mm in 0.4 rad
+    odometry_twist_slip: float = 0.05  # [m/rad] what is left of the shift of a twisting sole, of 0.17 m/rad itself
     odometry_height_noise: float = 0.0005  # [m] of base_link; 0.0004 was found
     odometry_velocity_noise: float = 0.014  # [m/s] of base_link, horizontal, as found
     odometry_climb_noise: float = 0.005  # [m/s] of base_link, vertical, as found

@@ -19,13 +19,14 @@ def random_commands(rng: np.random.Generator, seconds: float) -> Iterator[Comman
 
     Args:
         rng: Source of all randomness.
-        seconds: How long all of them take together.
+        seconds: How long all of them take together, in tenths.
     """
     p = MotionParameters()
     left = seconds
-    while left > 0.0:
+    while left > 0.05:
         kind = KINDS[rng.integers(len(KINDS))]
         share, side, duration = float(rng.uniform(0.2, 1.0)), float(rng.choice((-1.0, 1.0))), float(rng.uniform(1.5, 5))
+        duration = round(min(duration, left), 1)  # whole ticks
         velocity = {
             "forward": (share * p.max_speed_forward, 0.0, 0.0),
             "backward": (-share * p.max_speed_backward, 0.0, 0.0),
@@ -34,5 +35,5 @@ def random_commands(rng: np.random.Generator, seconds: float) -> Iterator[Comman
             "arc": (share * 0.7 * p.max_speed_forward, side * 0.3 * p.max_speed_sideways, side * share * 0.5),
             "stand": None,
         }[kind]
-        yield min(duration, left), velocity
+        yield duration, velocity
         left -= duration
