@@ -112,7 +112,7 @@ def test_a_fall_makes_the_place_unsure_but_not_the_heading() -> None:
 def test_errors_against_the_truth_are_as_large_as_the_covariance_says() -> None:
     """Mean NEES of (x, y, yaw) over 20 random walks: inside the two-sided 95 % bounds of chi-square."""
     runs = 20
-    looks = [bench.walk(100 + seed, 5.0, 2.5)[1] for seed in range(runs)]
+    looks = [bench.walk(100 + seed, 4.0, 2.0)[1] for seed in range(runs)]
     low, high = bench.bounds(runs)
     for time in range(2):
         values = [bench.nees(run[time][1], run[time][0]) for run in looks]

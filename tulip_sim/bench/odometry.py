@@ -79,7 +79,8 @@ def bounds(runs: int) -> tuple[float, float]:
 def measure(seed: int) -> Row:
     """Walk once."""
     body, looks = walk(seed, DURATION, PERIOD)
-    odometry, error = looks[-1]
+    odometry = body.motion.odometry()
+    error = planar_error(odometry, body.world.truth(), START)
     minutes = odometry.stamp / 60e9
     return {
         "seed": seed,
@@ -100,12 +101,9 @@ def measure(seed: int) -> Row:
 def summarize(rows: list[Row]) -> list[str]:
     """Return drift and consistency."""
     whole = [row for row in rows if row["upright"]]
-    low, high = bounds(len(whole))
-    means = np.mean([row["NEES"] for row in whole], axis=0)
-    inside = int(np.sum((means >= low) & (means <= high)))
     drift = np.abs([row["drift [%]"] for row in rows])
     heading = np.array([row["heading drift [deg/min]"] for row in rows])
-    return [
+    lines = [
         f"{DURATION:.0f} s of random commands (forward, backward, sideways, turning, arcs, standing), randomised as for"
         " walking; odometry of legs and IMU alone against the truth.",
         "",
@@ -113,15 +111,24 @@ def summarize(rows: list[Row]) -> list[str]:
         f"- drift in position at the end: median {np.median(drift):.2f} %, most {drift.max():.2f} % of the way walked"
         f" (median {np.median([row['distance [m]'] for row in rows]):.1f} m)",
         f"- heading drift: {np.sqrt((heading**2).mean()):.2f} deg/min RMS, most {np.abs(heading).max():.2f} deg/min",
-        f"- NEES of (x, y, yaw), mean over runs and times: {means.mean():.2f} (3 if the covariance is exact);"
-        f" means at {inside} of {len(means)} times inside the 95 % bounds {low:.2f} to {high:.2f},"
-        f" {int(np.sum(means > high))} above (too sure of itself), {int(np.sum(means < low))} below (too careful)",
     ]
+    if whole:
+        low, high = bounds(len(whole))
+        means = np.mean([row["NEES"] for row in whole], axis=0)
+        inside = int(np.sum((means >= low) & (means <= high)))
+        lines.append(
+            f"- NEES of (x, y, yaw), mean over runs and times: {means.mean():.2f} (3 if the covariance is exact);"
+            f" means at {inside} of {len(means)} times inside the 95 % bounds {low:.2f} to {high:.2f},"
+            f" {int(np.sum(means > high))} above (too sure of itself), {int(np.sum(means < low))} below (too careful)"
+        )
+    return lines
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
     """Draw errors beside their claimed 2-sigma bounds, and the mean NEES beside the bounds of chi-square."""
     whole = [row for row in rows if row["upright"]]
+    if not whole:
+        return
     figure = Figure(figsize=(9, 6.5), layout="constrained")
     axes = figure.subplots(2, 2)
     names = (("x", 1000.0, "mm"), ("y", 1000.0, "mm"), ("yaw", math.degrees(1.0), "deg"))
