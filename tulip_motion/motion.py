@@ -191,15 +191,19 @@ class Motion:
     def _change_mode(self, estimate: Estimate) -> None:
         p, wanted = self._parameters, self._command.mode
         if self._mode is MotionMode.FALLEN or self._mode is MotionMode.LIMP:
-            if self._may_stand(estimate) and wanted is not WalkMode.LIMP:
+            if self._mode is MotionMode.LIMP and estimate.tilt > p.fall_tilt:
+                self._fall("fell while it was limp on request")
+            elif self._may_stand(estimate) and wanted is not WalkMode.LIMP:
+                if isinstance(self._gait, Walking):
+                    self._steps_before += self._gait.step_count
                 self._estimator.restart()
+                self._twist.restart()
                 self._mode, self._reason, self._gait, self._started = MotionMode.STAND, "", None, False
             return
         dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
         fall = self._falls.is_falling(estimate.base_rotation, estimate.angular_velocity, dcm, estimate.soles)
         if fall:
-            self._mode, self._reason = MotionMode.FALLEN, fall
-            self._dead_reckoning.fall()
+            self._fall(fall)
         elif wanted is WalkMode.LIMP:
             self._mode, self._reason = MotionMode.LIMP, "limp on request"
         elif self._gait is not None and self._gait.finished:
@@ -210,6 +214,10 @@ class Motion:
         elif self._mode is MotionMode.STAND and wanted is WalkMode.WALK:
             self._gait = Walking(p, self._feet(), self._middle())
             self._mode = MotionMode.WALK
+
+    def _fall(self, reason: str) -> None:
+        self._mode, self._reason = MotionMode.FALLEN, reason
+        self._dead_reckoning.fall()
 
     def _may_stand(self, estimate: Estimate) -> bool:
         p = self._parameters
@@ -225,11 +233,14 @@ class Motion:
             velocity = self._command.velocity if self._command.mode is WalkMode.WALK else None
             shift_x, shift_y = self._twist.shift
             landed = [Pose2D(at.x + shift_x, at.y + shift_y, at.yaw) for at in map(planar_pose, estimate.soles)]
+            before = self._gait.feet
             reference = self._gait.tick(dt, velocity, (dcm[0], dcm[1]), landed, estimate.loads)
+            self._gait.feet = self._twist.carried(before, self._gait.feet)
             self._anchor(self._gait.feet)
             if reference.support is not Support.DOUBLE:
-                stance = reference.stance
-                self._twist.update(stance.pose, planar_pose(estimate.soles[stance.side]).yaw, estimate.zmp)
+                side = reference.stance.side
+                yaw = planar_pose(estimate.soles[side]).yaw
+                self._twist.update(self._estimator.anchors[side], yaw, estimate.zmp)
             return reference
         if isinstance(self._gait, Kick):
             reference = self._gait.tick(dt, planar_pose(estimate.soles[self._gait.side]), estimate.loads)

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_description.planar import Pose2D, wrap_angle
+from tulip_motion.footsteps import Footstep
 from tulip_motion.parameters import MotionParameters
 
 TWIST_FILTER = 0.02  # [s] over which the IMU's noise of 1 mrad is smoothed; a step takes twenty times as long
@@ -49,6 +50,24 @@ class StanceTwist:
         """Begin a step."""
         self.shift = (0.0, 0.0)
         self.twist = 0.0
+
+    def carried(self, before: tuple[Footstep, Footstep], after: tuple[Footstep, Footstep]) -> tuple[Footstep, Footstep]:
+        """Return the feet after a landing, with the foot that stood where and as it has been turned.
+
+        Both feet move by the same, so that they stand to each other as the joints say.
+
+        Args:
+            before: Left and right foot before the landing.
+            after: The same with the one that landed at its place, shift included.
+        """
+        if before == after:
+            return after
+        left, right = (self._moved(new) if new == old else new for old, new in zip(before, after, strict=True))
+        return left, right
+
+    def _moved(self, foot: Footstep) -> Footstep:
+        x, y = self.shift
+        return Footstep(foot.side, Pose2D(foot.pose.x + x, foot.pose.y + y, wrap_angle(foot.pose.yaw + self.twist)))
 
     def update(self, anchor: Pose2D, yaw: float, pressure: Array) -> None:
         """Look at the foot in single support.

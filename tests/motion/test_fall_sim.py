@@ -27,7 +27,7 @@ def limp(body: Body, seconds: float) -> None:
         body.tick(STAND)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_after_a_fall_and_the_referees_hands_the_robot_stands_and_walks_again(seed: int) -> None:
     rng = np.random.default_rng([seed, 1])
     body = Body(seed, START, ball=(0.0, 0.0))
@@ -49,8 +49,8 @@ def test_after_a_fall_and_the_referees_hands_the_robot_stands_and_walks_again(se
     lying = body.motion.odometry()
     assert lying.covariance[0, 0] > before.covariance[0, 0] + 0.2
 
+    steps = body.motion.state().step_count
     body.world.set_upright()
-    body.go(0.2)
     limp(body, 1.0)
     assert body.motion.mode is MotionMode.STAND
     assert body.motion.state().reason == ""
@@ -59,6 +59,7 @@ def test_after_a_fall_and_the_referees_hands_the_robot_stands_and_walks_again(se
     assert body.motion.mode is MotionMode.WALK
     way = float(np.linalg.norm(body.world.truth().base_position[:2] - start))
     assert way > 1.0
+    assert body.motion.state().step_count > steps
     after = body.motion.odometry()
     assert float(np.linalg.norm(after.position[:2] - counted.position[:2])) == pytest.approx(way, abs=0.03)
     assert after.distance > before.distance + 1.0
@@ -76,5 +77,5 @@ def test_no_false_alarm_in_survived_pushes_fast_walking_and_kicks(seed: int) -> 
         direction = rng.uniform(-math.pi, math.pi)
         body.world.push([50.0 * math.cos(direction), 50.0 * math.sin(direction), 0.0], 100)
         body.go(1.5, (0.2, 0.0, 0.0))
-    body.go(4.0, (0.6, 0.0, 0.0))
+    body.go(3.0, (0.6, 0.0, 0.0))
     assert not body.fallen, body.motion.state().reason

@@ -10,7 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tulip_description.planar import Pose2D
-from tulip_motion.odometry import DeadReckoning
+from tulip_motion.footsteps import Footstep
+from tulip_motion.interface import Side
+from tulip_motion.odometry import DeadReckoning, StanceTwist
 from tulip_motion.parameters import MotionParameters
 from tulip_sim.bench import odometry as bench
 
@@ -106,6 +108,32 @@ def test_a_fall_makes_the_place_unsure_but_not_the_heading() -> None:
     assert after[0, 0] - before[0, 0] == pytest.approx(P.odometry_fall_spread**2)
     assert after[5, 5] == before[5, 5]
     assert after[2, 2] == P.odometry_fall_spread**2
+
+
+def test_a_twisting_sole_pivots_about_its_centre_of_pressure() -> None:
+    twist = StanceTwist(P.control_period)
+    anchor, pivot, turned = Pose2D(1.0, 0.5, 0.3), np.array([1.14, 0.54]), 0.1
+    for share in np.linspace(0.0, 1.0, 40):
+        twist.update(anchor, anchor.yaw + share * turned, pivot)
+    for _ in range(40):  # the filter settles
+        twist.update(anchor, anchor.yaw + turned, pivot)
+    about = Pose2D(*pivot, turned) @ Pose2D(*(-pivot)) @ Pose2D(anchor.x, anchor.y)
+    assert twist.twist == pytest.approx(turned, abs=1e-4)
+    np.testing.assert_allclose(twist.shift, (about.x - anchor.x, about.y - anchor.y), atol=0.001)  # of second order
+    before = twist.twist
+    twist.update(anchor, anchor.yaw + turned, np.full(2, np.nan))  # no contact, no pivot
+    assert math.isfinite(twist.shift[0]) and twist.twist == pytest.approx(before, abs=1e-4)
+
+
+def test_feet_keep_their_places_to_each_other_when_a_twist_is_taken_off() -> None:
+    twist = StanceTwist(P.control_period)
+    twist.shift, twist.twist = (0.02, -0.01), 0.1
+    stance, lifted = Footstep(Side.LEFT, Pose2D(0.0, 0.12)), Footstep(Side.RIGHT, Pose2D(0.0, -0.12))
+    landed = Footstep(Side.RIGHT, Pose2D(0.32, -0.13))  # shift included
+    left, right = twist.carried((stance, lifted), (stance, landed))
+    assert right == landed
+    assert left.pose.as_array() == pytest.approx([0.02, 0.11, 0.1])
+    assert twist.carried((stance, lifted), (stance, lifted)) == (stance, lifted)
 
 
 @pytest.mark.sim
