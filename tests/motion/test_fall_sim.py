@@ -79,3 +79,13 @@ def test_no_false_alarm_in_survived_pushes_fast_walking_and_kicks(seed: int) -> 
         body.go(1.5, (0.2, 0.0, 0.0))
     body.go(3.0, (0.6, 0.0, 0.0))
     assert not body.fallen, body.motion.state().reason
+
+
+def test_a_robot_that_falls_while_limp_on_request_says_so() -> None:
+    body = Body(0, START, ball=(0.0, 0.0))
+    body.go(0.3)
+    body.world.push([200.0, 0.0, 0.0], 100)
+    for _ in range(500):
+        body.tick(WalkCommand(0, WalkMode.LIMP))
+    assert body.motion.mode is MotionMode.FALLEN
+    assert body.motion.state().reason == "fell while it was limp on request"

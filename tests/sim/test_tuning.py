@@ -12,6 +12,7 @@ from typer.testing import CliRunner, Result
 
 from tulip_motion.gait_file import PATH, GaitFile, GaitFileError, read_gait, write_gait
 from tulip_motion.parameters import MotionParameters
+from tulip_ros.plan import read_parameters
 from tulip_sim.tuner import Tuner, TuningSettings
 from tulip_sim.tuning import SPACE, Figures, evaluate, try_walk
 
@@ -36,6 +37,10 @@ def test_defaults_of_motion_come_from_the_gait_file() -> None:
     assert set(gait) <= {field.name for field in fields(MotionParameters)}
     for name, value in gait.items():
         assert getattr(defaults, name) == value
+
+
+def test_gait_file_is_a_parameter_file_of_the_graph() -> None:
+    assert read_parameters(PATH) == {"motion": read_gait(PATH)}
 
 
 @pytest.mark.parametrize(
