@@ -48,8 +48,7 @@ class FallDetector:
             )
         elif predicted > p.fall_lean:
             forward, left = beyond_feet(rotation, dcm, soles, p.zmp_forward)
-            reach_forward, reach_side = p.max_stride + p.zmp_limit_toe, p.max_foot_distance + p.zmp_limit_side
-            if math.hypot(forward / reach_forward, left / reach_side) > 1.0:
+            if math.hypot(forward / p.fall_reach_forward, left / p.fall_reach_side) > 1.0:
                 reason = (
                     f"falls: the torso leans {math.degrees(tilt):.0f} deg and the DCM is"
                     f" {math.hypot(forward, left):.2f} m from the feet, beyond every foothold"

@@ -110,6 +110,8 @@ class MotionParameters:
     fall_tilt: float = 0.7  # [rad] of the torso, after fall_horizon: no step can save the robot; 0.27 was survived
     fall_horizon: float = 0.2  # [s] that the tilt is predicted by; longer, and a hard foot strike looks like a fall
     fall_lean: float = 0.35  # [rad] after fall_horizon: with a DCM out of reach it is enough
+    fall_reach_forward: float = 0.45  # [m] of the DCM from the feet: a stride of 0.36 m and the toe
+    fall_reach_side: float = 0.475  # [m] a step of 0.42 m sideways and the edge of the sole
     fall_confirm_time: float = 0.02  # [s] a sign has to last; impacts ring for less
     upright_tilt: float = 0.25  # [rad] below it, now and after fall_horizon, a limp robot may stand up again
     upright_height: float = 0.9  # [m] of base_link above the soles; from lower down a robot that fell does not get up
