@@ -14,6 +14,7 @@ from tulip_description.planar import Pose2D
 from tulip_description.robot import HEAD_JOINTS, LEG_JOINTS, Robot
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_motion.course import Wish, is_at, middle
+from tulip_motion.fall_detection import FallDetector
 from tulip_motion.feedforward import distance_share, feedforward
 from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import FootMotion, Reference, sole_point
@@ -32,6 +33,7 @@ from tulip_motion.joint_control import JointGains, feedback
 from tulip_motion.kick import Kick
 from tulip_motion.learning_file import LearningFile
 from tulip_motion.lipm import time_constant
+from tulip_motion.odometry import DeadReckoning, StanceTwist
 from tulip_motion.paper_gait import PaperGait
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import reach
@@ -82,7 +84,9 @@ class Motion:
         self._com_planned = np.zeros(2)
         self._com_planned_velocity = np.zeros(2)
         self._left_weight = 0.5
-        self._distance = 0.0
+        self._dead_reckoning = DeadReckoning(p)
+        self._twist = StanceTwist(p.control_period)
+        self._falls = FallDetector(p)
         self._torques = np.zeros((3, 12))
         self._learner: StepLearner | None = None
         if p.learning != "none":
@@ -156,7 +160,11 @@ class Motion:
             pin.Quaternion(estimate.base_rotation).coeffs(),
             rotation_z(-yaw) @ estimate.base_velocity,
             estimate.base_rotation.T @ estimate.angular_velocity,
-            self._distance,
+            self._dead_reckoning.distance,
+            self._dead_reckoning.pose_covariance(
+                self._stamp, estimate.base_position, yaw, self._mode is MotionMode.FALLEN
+            ),
+            self._dead_reckoning.twist_covariance(),
         )
 
     def state(self) -> MotionState:
@@ -213,18 +221,25 @@ class Motion:
         self._com_planned = estimate.com[:2].copy()
         self._acceleration = np.zeros(3)
         self._left_weight = 0.5
+        self._dead_reckoning.begin(self._stamp, estimate.base_position[:2])
         self._started = True
 
     def _change_mode(self, estimate: Estimate) -> None:
         p, wanted = self._parameters, self._command.mode
-        upright = estimate.tilt < p.upright_tilt
         if self._mode is MotionMode.FALLEN or self._mode is MotionMode.LIMP:
-            if upright and wanted is not WalkMode.LIMP and min(estimate.loads) > p.contact_force:
+            if self._mode is MotionMode.LIMP and estimate.tilt > p.fall_tilt:
+                self._fall("fell while it was limp on request")
+            elif self._may_stand(estimate) and wanted is not WalkMode.LIMP:
+                if isinstance(self._gait, Walking):
+                    self._steps_before += self._gait.step_count
                 self._estimator.restart()
+                self._twist.restart()
                 self._mode, self._reason, self._gait, self._started = MotionMode.STAND, "", None, False
-        elif estimate.tilt > p.fall_tilt:
-            self._mode = MotionMode.FALLEN
-            self._reason = f"fell: the torso leans {math.degrees(estimate.tilt):.0f} deg"
+            return
+        dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
+        fall = self._falls.is_falling(estimate.base_rotation, estimate.angular_velocity, dcm, estimate.soles)
+        if fall:
+            self._fall(fall)
         elif wanted is WalkMode.LIMP:
             self._mode, self._reason = MotionMode.LIMP, "limp on request"
         elif self._gait is not None and self._gait.finished:
@@ -256,13 +271,36 @@ class Motion:
             return command.goal
         return command.velocity if command.mode is WalkMode.WALK else None
 
+    def _fall(self, reason: str) -> None:
+        self._mode, self._reason = MotionMode.FALLEN, reason
+        self._dead_reckoning.fall()
+
+    def _may_stand(self, estimate: Estimate) -> bool:
+        p = self._parameters
+        if self._mode is MotionMode.LIMP:
+            return estimate.tilt < p.upright_tilt and min(estimate.loads) > p.contact_force
+        height = float(estimate.base_position[2] - min(estimate.soles[:, 2, 3]))
+        return self._falls.is_upright(estimate.base_rotation, estimate.angular_velocity, height, estimate.loads)
+
     def _advance_gait(self, estimate: Estimate) -> Reference:
         dt = self._parameters.control_period
         dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
-        if isinstance(self._gait, Walking | PaperGait):
+        if isinstance(self._gait, Walking):
+            shift_x, shift_y = self._twist.shift
+            landed = [Pose2D(at.x + shift_x, at.y + shift_y, at.yaw) for at in map(planar_pose, estimate.soles)]
+            before = self._gait.feet
+            reference = self._gait.tick(dt, self._wish(), (dcm[0], dcm[1]), landed, estimate.loads)
+            self._gait.feet = self._twist.carried(before, self._gait.feet)
+            self._anchor(self._gait.feet)
+            return reference
+        if isinstance(self._gait, PaperGait):
             landed = [planar_pose(sole) for sole in estimate.soles]
             reference = self._gait.tick(dt, self._wish(), (dcm[0], dcm[1]), landed, estimate.loads)
             self._anchor(self._gait.feet)
+            if reference.support is not Support.DOUBLE:
+                side = reference.stance.side
+                yaw = planar_pose(estimate.soles[side]).yaw
+                self._twist.update(self._estimator.anchors[side], yaw, estimate.zmp)
             return reference
         if isinstance(self._gait, Kick):
             reference = self._gait.tick(dt, planar_pose(estimate.soles[self._gait.side]), estimate.loads)
@@ -285,9 +323,10 @@ class Motion:
         """Tell the estimator where the feet stand, and count the way."""
         before = self._estimator.anchors
         if (feet[0].pose, feet[1].pose) != tuple(before):
-            for foot, old in zip(feet, list(before), strict=True):
-                # The body moves half as far as a foot does.
-                self._distance += 0.5 * math.hypot(foot.pose.x - old.x, foot.pose.y - old.y)
+            position = self._estimate.base_position[:2]
+            self._dead_reckoning.step(self._stamp, position, before, [foot.pose for foot in feet], self._twist.twist)
+            self._twist.restart()
+            for foot in feet:
                 self._estimator.anchor(foot)
 
     def _plan_com(self, reference: Reference) -> None:

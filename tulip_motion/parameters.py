@@ -1,10 +1,11 @@
-"""Parameters of motion control: every default stands here, once."""
+"""Parameters of motion control: every default stands here, once, or in gait.yaml if the gait tuner finds it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from math import cosh
 
+from tulip_motion.gait_file import GaitFile
 from tulip_motion.lipm import time_constant
 
 CHOICES = {
@@ -15,6 +16,9 @@ CHOICES = {
     "learning": ("none", "adaptive", "waveform"),
 }
 """Values of the parameters that are words."""
+
+_GAIT = GaitFile()
+_tuned = _GAIT.value
 
 
 @dataclass(frozen=True)
@@ -28,17 +32,17 @@ class MotionParameters:
 
     # Gait: "dcm" walks best, with feedback; "paper" is eqs. (3)-(4) in open loop
     gait: str = "dcm"
-    com_height: float = 0.71  # [m] above the ground; leaves the knees bent enough for long steps
-    step_time: float = 0.36  # [s] whole step in place, double support included: quick steps catch pushes
-    step_time_growth: float = 0.22  # [s/(m/s)] and longer steps need more time: 0.49 s at 0.6 m/s
-    double_support_time: float = 0.06  # [s] of it the ZMP moves from the old to the new stance foot
-    first_shift_time: float = 0.5  # [s] the ZMP moves over the first stance foot
-    stop_shift_time: float = 0.6  # [s] the ZMP moves back between the feet after the last step
-    stance_width: float = 0.27  # [m] between the ankles; hips are 0.267 m apart
-    swing_height: float = 0.045  # [m] clears 10 mm of turf and 20 mm of tracking error
-    landing_speed: float = 0.15  # [m/s] the foot goes on down when the ground comes late
-    zmp_forward: float = 0.040  # [m] aim point of the ZMP ahead of the ankle: the middle of the sole
-    zmp_inward: float = 0.0  # [m] aim point towards the other foot
+    com_height: float = _tuned("com_height")  # [m] above the ground; leaves the knees bent enough for long steps
+    step_time: float = _tuned("step_time")  # [s] whole step in place: quick steps catch pushes
+    step_time_growth: float = _tuned("step_time_growth")  # [s/(m/s)] longer steps need more time
+    double_support_time: float = _tuned("double_support_time")  # [s] of it the ZMP moves to the new stance foot
+    first_shift_time: float = _tuned("first_shift_time")  # [s] the ZMP moves over the first stance foot
+    stop_shift_time: float = _tuned("stop_shift_time")  # [s] the ZMP moves back between the feet after the last step
+    stance_width: float = _tuned("stance_width")  # [m] between the ankles; hips are 0.267 m apart
+    swing_height: float = _tuned("swing_height")  # [m] clears 10 mm of turf and 20 mm of tracking error
+    landing_speed: float = _tuned("landing_speed")  # [m/s] the foot goes on down when the ground comes late
+    zmp_forward: float = _tuned("zmp_forward")  # [m] aim point of the ZMP ahead of the ankle: the middle of the sole
+    zmp_inward: float = _tuned("zmp_inward")  # [m] aim point towards the other foot
     # Speeds that were walked without a fall; the reach of a step limits them as well
     max_speed_forward: float = 0.65  # [m/s]
     max_speed_backward: float = 0.35  # [m/s]
@@ -57,15 +61,21 @@ class MotionParameters:
     contact_force: float = 40.0  # [N] on a sole means that it carries weight
     contact_phase: float = 0.6  # of the swing; earlier contacts are stubbed toes, not landings
     late_contact_time: float = 0.10  # [s] after the planned landing the step is taken as landed
-    placement_freeze_time: float = 0.08  # [s] before landing; a target that still moved would ask for endless jerk
-    placement_gain: float = 1.0  # 1 puts the foot where the DCM will be
-    ankle_share: float = 0.8  # of the ZMP's range that a step may count on against a disturbance
-    step_time_weight: float = 0.003  # [m^2/s^2] landing 0.1 s early or late costs as much as 5 mm of DCM error
-    step_place_weight: float = 0.02  # [1] against the DCM error squared
-    max_step_extension: float = 0.15  # [s] a step may last longer than planned
-    max_step_time_rate: float = 5.0  # [s/s] of the landing time
-    outer_excess_weight: float = 2.0  # [1] DCM error beyond the landing foot, where no next step can catch it
-    max_swing_speed: float = 2.4  # [m/s] of the foot
+    placement_freeze_time: float = _tuned(
+        "placement_freeze_time"
+    )  # [s] before landing; later moves ask for endless jerk
+    placement_gain: float = _tuned("placement_gain")  # 1 puts the foot where the DCM will be
+    ankle_share: float = _tuned("ankle_share")  # of the ZMP's range that a step may count on against a disturbance
+    step_time_weight: float = _tuned(
+        "step_time_weight"
+    )  # [m^2/s^2] 0.1 s early or late costs as much as 5 mm of DCM error
+    step_place_weight: float = _tuned("step_place_weight")  # [1] against the DCM error squared
+    max_step_extension: float = _tuned("max_step_extension")  # [s] a step may last longer than planned
+    max_step_time_rate: float = _tuned("max_step_time_rate")  # [s/s] of the landing time
+    outer_excess_weight: float = _tuned(
+        "outer_excess_weight"
+    )  # [1] DCM error beyond the landing foot: no next step catches it
+    max_swing_speed: float = _tuned("max_swing_speed")  # [m/s] of the foot
 
     # The paper's gait. Eq. (4) as printed is "sat" with both times 0: the foot rises at 4 m/s, and lands at 2 c'
     paper_step_time: float = 0.45  # [s]
@@ -89,16 +99,16 @@ class MotionParameters:
     max_kick_direction: float = 0.5  # [rad] either side, from the reach of the hip roll
 
     # Balance
-    dcm_gain: float = 3.0  # k in zmp = ref + (1 + k) (dcm - ref)
+    dcm_gain: float = _tuned("dcm_gain")  # k in zmp = ref + (1 + k) (dcm - ref)
     zmp_limit_heel: float = 0.08  # [m] behind the aim point
     zmp_limit_toe: float = 0.09  # [m] ahead of the aim point
-    zmp_limit_side: float = 0.065  # [m] either side of the aim point
-    observer_position_gain: float = 30.0  # [1/s]
-    observer_velocity_gain: float = 60.0  # [1/s]
-    height_stiffness: float = 100.0  # [1/s^2]
-    height_damping: float = 20.0  # [1/s]
-    torso_stiffness: float = 60.0  # [1/s^2] IMU attitude to torso angular acceleration
-    torso_damping: float = 12.0  # [1/s]
+    zmp_limit_side: float = _tuned("zmp_limit_side")  # [m] either side of the aim point
+    observer_position_gain: float = _tuned("observer_position_gain")  # [1/s]
+    observer_velocity_gain: float = _tuned("observer_velocity_gain")  # [1/s]
+    height_stiffness: float = _tuned("height_stiffness")  # [1/s^2]
+    height_damping: float = _tuned("height_damping")  # [1/s]
+    torso_stiffness: float = _tuned("torso_stiffness")  # [1/s^2] IMU attitude to torso angular acceleration
+    torso_damping: float = _tuned("torso_damping")  # [1/s]
 
     # Inverse kinematics, eq. (10)
     clik_gain_position: float = 20.0  # [1/s] K_p
@@ -146,9 +156,33 @@ class MotionParameters:
     learning_leak: float = 0.02  # adaptive: share of theta forgotten each step
     learning_damping_bound: float = 2.0  # adaptive: theta_1 + beta theta_2 at most, by K_D
 
+    # Odometry: standard deviations of its errors, from walks whose true way was measured from outside; a robot of metal
+    # needs such walks too: the heading over minutes of standing, the feet's places over some ten steps of each kind
+    odometry_yaw_drift: float = 0.0003  # [rad/s] of the IMU's heading, constant in a run; least squares over 40 s each
+    odometry_yaw_walk: float = 0.0001  # [rad/sqrt(s)] what a constant drift leaves over; none was found, so the bound
+    odometry_yaw_noise: float = 0.001  # [rad] of one heading, white: its spread while standing
+    odometry_tilt_noise: float = 0.001  # [rad] of roll and pitch, white: their spread while standing
+    odometry_tilt_bias: float = 0.003  # [rad] of roll and pitch, constant: spread of the mean over robots
+    odometry_step_noise: float = 0.0003  # [m] a step; soles land within 0.1 mm of where the joints say
+    odometry_forward_slip: float = 0.003  # share of the way; 0.001 was found on level carpet of friction 0.6 to 1.0
+    odometry_sideways_slip: float = 0.006  # share of the way
+    odometry_turn_slip: float = 0.001  # [m/rad] a sole that twists on the ground also shifts: 0.3 mm in 0.4 rad
+    odometry_twist_slip: float = 0.05  # [m/rad] what is left of the shift of a twisting sole, of 0.17 m/rad itself
+    odometry_height_noise: float = 0.0005  # [m] of base_link; 0.0004 was found
+    odometry_velocity_noise: float = 0.014  # [m/s] of base_link, horizontal, as found
+    odometry_climb_noise: float = 0.005  # [m/s] of base_link, vertical, as found
+    odometry_rate_noise: float = 0.007  # [rad/s] of the gyro, noise and bias
+    odometry_fall_spread: float = 0.7  # [m] a fallen robot is set up where it lies: about its own CoM height away
+
     # Falling
-    fall_tilt: float = 0.7  # [rad] beyond it no step can save the robot
-    upright_tilt: float = 0.25  # [rad] below it a limp robot may stand up again
+    fall_tilt: float = 0.7  # [rad] of the torso, after fall_horizon: no step can save the robot; 0.27 was survived
+    fall_horizon: float = 0.2  # [s] that the tilt is predicted by; longer, and a hard foot strike looks like a fall
+    fall_lean: float = 0.35  # [rad] after fall_horizon: with a DCM out of reach it is enough
+    fall_reach_forward: float = 0.45  # [m] of the DCM from the feet: a stride of 0.36 m and the toe
+    fall_reach_side: float = 0.475  # [m] a step of 0.42 m sideways and the edge of the sole
+    fall_confirm_time: float = 0.02  # [s] a sign has to last; impacts ring for less
+    upright_tilt: float = 0.25  # [rad] below it, now and after fall_horizon, a limp robot may stand up again
+    upright_height: float = 0.9  # [m] of base_link above the soles; from lower down a robot that fell does not get up
 
     def __post_init__(self) -> None:
         for name in ("control_period", "com_height", "step_time", "double_support_time", "stance_width"):
@@ -207,3 +241,6 @@ class MotionParameters:
         gamma = (self.learning_gamma_rate, self.learning_gamma_sign, self.learning_gamma_cross)
         if min(gamma[:2]) < 0.0 or gamma[0] * gamma[1] < gamma[2] ** 2:
             raise ValueError(f"learning_gamma_rate, _sign, _cross are {gamma}; expected a positive semidefinite Gamma")
+
+
+_GAIT.check_complete()

@@ -64,7 +64,7 @@ class World:
         self.robot = robot if robot is not None else load_robot()
         physics_rng, sensor_rng = np.random.default_rng(seed).spawn(2)
         start = standing_posture(self.robot).joint_positions if joint_positions is None else np.array(joint_positions)
-        height = _base_height(self.robot, start)
+        self._start, self._start_height = start, _base_height(self.robot, start)
         p = self.parameters
         self._now = 0
         self.friction = float(physics_rng.uniform(*p.friction))
@@ -86,7 +86,7 @@ class World:
         self._com_in_base = np.array(self.robot.links[0].com)
         n = len(self._joint_indices)
         self._dry_friction = self.robot.effort_limits * physics_rng.uniform(*p.joint_friction, n)
-        self._place_robot(scenario.robot, start, height)
+        self._place_robot(scenario.robot)
         self.place_ball(*scenario.ball)
         self._driver = JointDriver(self.robot, p.driver, start)
         self._effort = np.zeros(n)
@@ -222,17 +222,37 @@ class World:
             self._ball, [vx, vy, 0.0], [-vy / radius, vx / radius, 0.0], physicsClientId=self._client
         )
 
+    def set_upright(self, pose: Pose2D | None = None) -> None:
+        """Set the robot on its feet in its start posture, at rest, as a referee's hands would, and let go.
+
+        Args:
+            pose: Where base_link shall stand, in map; None for where the robot is, with the heading that it has.
+
+        Raises:
+            ValueError: if a number is not finite.
+        """
+        if pose is None:
+            position, (_, _, z, w), _ = self._base_pose()
+            # Of all headings the one that takes the least turning from how the trunk lies.
+            pose = Pose2D(float(position[0]), float(position[1]), 2.0 * math.atan2(float(z), float(w)))
+        if not all(math.isfinite(value) for value in (pose.x, pose.y, pose.yaw)):
+            raise ValueError(f"robot shall stand at {pose}; expected finite numbers")
+        self._place_robot(pose)
+        self._push_end = self._now
+        self._positions, self._velocities = self._start.copy(), np.zeros(len(self._start))
+
     def close(self) -> None:
         """Free the physics engine; the world cannot be used afterwards."""
         self._finalizer()
 
-    def _place_robot(self, pose: Pose2D, joints: Array, height: float) -> None:
+    def _place_robot(self, pose: Pose2D) -> None:
         client = self._client
         turn = np.array([0.0, 0.0, math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)])
-        base = np.array([pose.x, pose.y, height])
+        base = np.array([pose.x, pose.y, self._start_height])
         com = base + _rotation(turn) @ self._com_in_base  # pybullet places the CoM, not the link's frame
         pybullet.resetBasePositionAndOrientation(self._body, com.tolist(), turn.tolist(), physicsClientId=client)
-        for index, angle in zip(self._joint_indices, joints, strict=True):
+        pybullet.resetBaseVelocity(self._body, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], physicsClientId=client)
+        for index, angle in zip(self._joint_indices, self._start, strict=True):
             pybullet.resetJointState(self._body, index, float(angle), 0.0, physicsClientId=client)
 
     def _friction_torque(self) -> Array:
