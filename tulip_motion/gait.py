@@ -48,6 +48,7 @@ class Reference:
         zmp, dcm: (2,) planned [m].
         torso_yaw, torso_yaw_rate: [rad], [rad/s].
         phase: Progress of the step or kick, 0 to 1.
+        torso_yaw_acceleration: [rad/s^2].
     """
 
     support: Support
@@ -58,6 +59,7 @@ class Reference:
     torso_yaw: float
     torso_yaw_rate: float
     phase: float
+    torso_yaw_acceleration: float = 0.0
 
 
 def support_on(side: Side) -> Support:

@@ -18,6 +18,8 @@ from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import FootMotion, Reference, sole_point
 from tulip_motion.interface import (
     KickGoal,
+    KickKind,
+    KickProgress,
     MotionMode,
     MotionState,
     Odometry,
@@ -28,12 +30,14 @@ from tulip_motion.interface import (
 )
 from tulip_motion.inverse_kinematics import InverseKinematics, TaskTarget, orientation_error, rotation_z
 from tulip_motion.joint_control import JointGains, feedback
-from tulip_motion.kick import Kick
+from tulip_motion.kick import Kick, moved
+from tulip_motion.kick_plan import plan_kick, refused_numbers
 from tulip_motion.lipm import time_constant
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.stabilizer import Balance, stabilize
 from tulip_motion.state_estimator import Estimate, StateEstimator, planar_pose
 from tulip_motion.walking import Walking
+from tulip_motion.walking_kick import WalkingKick
 
 Array = NDArray[np.float64]
 
@@ -60,12 +64,14 @@ class Motion:
             self._model, p.clik_gain_position, p.clik_gain_orientation, p.clik_damping, robot.position_limits[:, :12]
         )
         self._gains = JointGains(p)
+        self._soles = robot.feet
         self._effort_limits = robot.effort_limits[:12]
         self._omega = 1.0 / time_constant(p.com_height)
         self._command = WalkCommand(0, WalkMode.STAND)
         self._mode = MotionMode.STAND
         self._reason = ""
         self._gait: Walking | Kick | None = None
+        self._kick: Kick | WalkingKick | None = None
         self._steps_before = 0
         self._started = False
         self._sequence = 0
@@ -93,16 +99,51 @@ class Motion:
 
     def start_kick(self, goal: KickGoal) -> str:
         """Begin a kick; return "" or the reason why not."""
-        p = self._parameters
+        if self._kick is not None and not self._kick.finished:
+            return "another kick is under way"
+        if goal.kind is KickKind.WALKING:
+            return self._start_walking_kick(goal)
         if self._mode is not MotionMode.STAND or not self._started:
-            return f"motion is in mode {self._mode.name}; a kick starts from STAND"
-        if not 0.0 < goal.speed <= p.max_kick_speed:
-            return f"speed is {goal.speed} m/s; expected above 0 and at most {p.max_kick_speed} m/s"
-        if not abs(goal.direction) <= p.max_kick_direction:
-            return f"direction is {goal.direction} rad; expected within +-{p.max_kick_direction} rad"
-        self._gait = Kick(p, goal, self._feet(), self._middle())
+            return f"motion is in mode {self._mode.name}; a {goal.kind.name.lower()} kick starts from STAND"
+        p, feet = self._parameters, self._feet()
+        base = self._base_footprint()
+        left, right = (base.inverse() @ foot.pose for foot in feet)
+        plan = plan_kick(p, goal, (left, right), self._soles)
+        if isinstance(plan, str):
+            return plan
+        self._gait = self._kick = Kick(p, [moved(move, base) for move in plan], feet, feet[goal.side], self._middle())
         self._mode = MotionMode.KICK
         return ""
+
+    def cancel_kick(self) -> str:
+        """Give the running kick up as its phase allows; return "" or the reason why not."""
+        if self._kick is None or self._kick.finished:
+            return "no kick is under way"
+        self._kick.cancel("cancelled on request")
+        return ""
+
+    @property
+    def kick_progress(self) -> KickProgress | None:
+        """How far the last kick that was started has come; None before the first."""
+        kick = self._kick
+        return None if kick is None else KickProgress(not kick.finished, kick.phase, kick.reason)
+
+    def _start_walking_kick(self, goal: KickGoal) -> str:
+        p = self._parameters
+        if self._mode is not MotionMode.WALK or not isinstance(self._gait, Walking):
+            return f"motion is in mode {self._mode.name}; a walking kick starts from WALK"
+        if goal.ball is None:
+            return "no place of the ball is given; a walking kick needs it to find the step that reaches it"
+        refusal = refused_numbers(goal, p.max_walking_kick_speed, 0.0, p.max_walking_kick_direction)
+        if refusal:
+            return refusal
+        base = self._base_footprint()
+        ball, direction = base.transform(goal.ball), base.yaw + goal.direction
+        kick = WalkingKick(p, goal.side, ball, direction, goal.speed, self._soles)
+        refusal = self._gait.kick_next(kick)
+        if not refusal:
+            self._kick = kick
+        return refusal
 
     def tick(self, sensors: Sensors) -> JointCommand:
         """Return the command for the legs that answers one reading of the sensors."""
@@ -112,6 +153,8 @@ class Motion:
             self._start(estimate)
         self._change_mode(estimate)
         if self._mode in (MotionMode.LIMP, MotionMode.FALLEN):
+            if self._kick is not None:
+                self._kick.abandon(self._reason)
             return self._limp(estimate)
         reference = self._reference = self._advance_gait(estimate)
         balance = self._balance = self._stabilize(estimate, reference)
@@ -162,6 +205,11 @@ class Motion:
             reason=self._reason,
         )
 
+    def _base_footprint(self) -> Pose2D:
+        """Return where base_footprint is in odom."""
+        position, rotation = self._estimate.base_position, self._estimate.base_rotation
+        return Pose2D(float(position[0]), float(position[1]), math.atan2(rotation[1, 0], rotation[0, 0]))
+
     def _feet(self) -> tuple[Footstep, Footstep]:
         left, right = self._estimator.anchors
         return Footstep(Side.LEFT, left), Footstep(Side.RIGHT, right)
@@ -194,6 +242,8 @@ class Motion:
         elif self._gait is not None and self._gait.finished:
             if isinstance(self._gait, Walking):
                 self._steps_before += self._gait.step_count
+                if self._gait.kick is not None:
+                    self._gait.kick.abandon("the walk has ended")
             self._gait = None
             self._mode = MotionMode.STAND
         elif self._mode is MotionMode.STAND and wanted is WalkMode.WALK:
@@ -210,7 +260,8 @@ class Motion:
             self._anchor(self._gait.feet)
             return reference
         if isinstance(self._gait, Kick):
-            reference = self._gait.tick(dt, planar_pose(estimate.soles[self._gait.side]), estimate.loads)
+            landed = [planar_pose(sole) for sole in estimate.soles]
+            reference = self._gait.tick(dt, landed, estimate.loads)
             self._anchor(self._gait.feet)
             return reference
         left, right = self._feet()
@@ -268,6 +319,7 @@ class Motion:
         acceleration[3:6] = p.torso_stiffness * orientation_error(torso, estimate.base_rotation) + p.torso_damping * (
             torso_rate - estimate.angular_velocity
         )
+        acceleration[5] += reference.torso_yaw_acceleration
         acceleration[6:9] = reference.other.acceleration
         acceleration[9:] = (0.0, 0.0, reference.other.yaw_acceleration)
         self._acceleration = acceleration[:3].copy()

@@ -16,6 +16,7 @@ from tulip_motion.gait import FootMotion, Reference, SwingFoot, sole_point, supp
 from tulip_motion.interface import Side, Support
 from tulip_motion.lipm import DcmPlan, time_constant
 from tulip_motion.parameters import MotionParameters
+from tulip_motion.walking_kick import KickSwing, WalkingKick
 
 PREVIEW_STEPS = 3  # what lies further ahead moves the DCM by less than exp(-3 T / Tc) = 0.7 %
 
@@ -43,7 +44,19 @@ class Walking:
         self._stance: Footstep | None = None
         self._closing = False
         self._heading: float | None = None
-        self._swing: SwingFoot | None = None
+        self._swing: SwingFoot | KickSwing | None = None
+        self.kick: WalkingKick | None = None
+        """A kick to be done by one of the steps."""
+
+    def kick_next(self, kick: WalkingKick) -> str:
+        """Take a kick for one of the steps after the present one; return "" or the reason why not."""
+        if self._stance is None or self._swing_over or self._closing:
+            return "the robot is stopping; a walking kick needs a walk that goes on"
+        coming = Footstep(self._stance.side.other, self._target)
+        refusal = kick.refusal(coming, self._stance.pose, self.velocity, self._parameters.stance_width)
+        if not refusal:
+            self.kick = kick
+        return refusal
 
     def tick(
         self,
@@ -96,6 +109,10 @@ class Walking:
             self._begin_stop()
             return
         steps = plan_footsteps(self._straightened(stance), self.velocity, p.step_time, p.stance_width, PREVIEW_STEPS)
+        if self.kick is not None:
+            if wanted is None:
+                self.kick.abandon("the robot was told to stop walking")
+            steps = self.kick.adapt(stance, self.feet[stance.side.other].pose, steps, self.velocity)
         self._heading = steps[0].pose.yaw
         self._target = self._nominal = steps[0].pose
         swing_time = p.step_time - p.double_support_time
@@ -162,7 +179,8 @@ class Walking:
         else:
             if self._swing is None:
                 duration = self._landing_time - self._shift_time
-                self._swing = SwingFoot(trailing.pose, duration, p.swing_height, p.landing_speed)
+                self._swing = self.kick.swing(trailing.pose, duration) if self.kick is not None else None
+                self._swing = self._swing or SwingFoot(trailing.pose, duration, p.swing_height, p.landing_speed)
             remaining = self._landing_time - self._time
             if remaining > p.placement_freeze_time:
                 error = (dcm[0] - planned[0], dcm[1] - planned[1])
