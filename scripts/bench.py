@@ -50,6 +50,8 @@ def main(
 
         rows = run(bench, workers, done)
     save(bench, rows, DOCS / "results")
+    if bench.draw is not None:
+        bench.draw(rows, DOCS / "results" / f"{bench.name}.png")
     write_results(list(BENCHES.values()), DOCS / "results", DOCS / "results.md")
     if json_path is not None:
         json_path.write_text(json.dumps(rows, indent=1) + "\n")

@@ -76,7 +76,7 @@ class Kick:
     def cancel(self, reason: str) -> None:
         """Give the kick up: stand at once if the foot is down still, else brake it, take it back and put it down.
 
-        A foot that is past the ball already goes on as planned, which is the same.
+        A foot that has met the ball goes on as planned: it slows down and comes back.
         """
         if self.finished or self.reason:
             return
@@ -86,11 +86,16 @@ class Kick:
         if not self._in_air:
             self._begin_to_stand()
             return
-        _, _, _, back, lower = self._moves
-        if self._air_time >= self._path.duration - back.duration - lower.duration:
+        lift, run_up, follow, back, lower = self._moves
+        if self._air_time >= lift.duration + run_up.duration:
             return
         p = self._parameters
-        stop = brake(self._path.evaluate(self._air_time), p.kick_brake_time)
+        foot, time = self._path.evaluate(self._air_time), p.kick_brake_time
+        if self._air_time > lift.duration:
+            # No farther than the follow-through would lead: beyond it the leg is too long and the robot falls.
+            left = float(np.linalg.norm(follow.end[:3] - foot.position))
+            time = min(time, 2.0 * left / max(float(np.linalg.norm(foot.velocity)), 1e-6))
+        stop = brake(foot, time)
         self._path = FootPath((stop, replace(back, start=stop.end), lower), p.landing_speed)
         self._air_time = 0.0
 

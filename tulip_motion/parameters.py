@@ -56,9 +56,9 @@ class MotionParameters:
     kick_reach_far: float = 0.07  # [m] farther
     kick_reach_across: float = 0.06  # [m] to either side
     kick_clearance: float = 0.01  # [m] between the feet, seen from above: a kicking foot is lower than a foot is high
-    kick_torso_turn: float = 3.0  # [rad/m^2] the torso turns by this times the area that the foot sweeps
+    kick_torso_turn: float = 3.0  # [rad/m^2] by the area that the foot sweeps; at 0 the stance foot slips by 3 deg
     kick_slip_time: float = 0.012  # [s] smoothing of the stance foot's measured yaw
-    kick_speed_ratio: float = 1.13  # ball's speed over the foot's, measured
+    kick_speed_ratio: float = 1.13  # ball's speed over the foot's, measured: 1.05 at 1 m/s, 1.16 at 3.6 m/s
     ball_radius: float = 0.0935  # [m] as in the field's file
     kick_zmp_inward: float = 0.01  # [m] aim point on the stance foot while kicking
     max_kick_speed: float = 3.5  # [m/s] of the ball, from torque and speed of the knee
@@ -70,7 +70,7 @@ class MotionParameters:
     side_kick_reach_near: float = 0.05  # [m] the ball may lie nearer than expected
     side_kick_reach_far: float = 0.05  # [m] farther
     side_kick_reach_across: float = 0.05  # [m] ahead or behind
-    side_kick_speed_ratio: float = 1.13  # ball's speed over the foot's, measured
+    side_kick_speed_ratio: float = 1.18  # ball's speed over the foot's, measured
     max_side_kick_speed: float = 2.0  # [m/s] of the ball
     max_side_kick_direction: float = 0.4  # [rad] either side of straight to the left or right
     walking_kick_steps: int = 8  # of the walk within which the ball has to be reached
@@ -80,7 +80,7 @@ class MotionParameters:
     walking_kick_reach_ahead: float = 0.20  # [m] at most
     walking_kick_reach_side: float = 0.36  # [m] beside it, at most; at least min_foot_distance
     walking_kick_speed_ratio: float = 1.13  # ball's speed over the foot's, measured
-    max_walking_kick_speed: float = 1.5  # [m/s] of the ball
+    max_walking_kick_speed: float = 2.0  # [m/s] of the ball
     max_walking_kick_direction: float = 0.3  # [rad] of the foot against the standing one
 
     # Balance

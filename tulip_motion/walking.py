@@ -53,7 +53,7 @@ class Walking:
         if self._stance is None or self._swing_over or self._closing:
             return "the robot is stopping; a walking kick needs a walk that goes on"
         coming = Footstep(self._stance.side.other, self._target)
-        refusal = kick.refusal(coming, self._stance.pose, self.velocity, self._parameters.stance_width)
+        refusal = kick.refusal(coming, self._stance.pose, self.velocity)
         if not refusal:
             self.kick = kick
         return refusal

@@ -16,6 +16,10 @@ from tulip_motion.kick_geometry import gap_between, striking_face
 from tulip_motion.kick_path import Quintic
 from tulip_motion.parameters import MotionParameters
 
+# Shares of the walk's forward speed at which the steps before the kick are tried, the least change first: a fast walk
+# makes longer strides than what one foot can reach.
+PACES = (1.0, 0.9, 1.1, 0.8, 0.7, 0.6, 0.5)
+
 Point = tuple[float, float]
 Velocity = tuple[float, float, float]
 
@@ -86,19 +90,20 @@ class WalkingKick:
         if not self.finished:
             self.finished, self.reason = True, self.reason or reason
 
-    def refusal(self, stance: Footstep, trailing: Pose2D, velocity: Velocity, stance_width: float) -> str:
+    def refusal(self, stance: Footstep, trailing: Pose2D, velocity: Velocity) -> str:
         """Return "" if one of the next steps reaches the ball, else why none does.
 
         Args:
             stance: The foot that will stand when the next step begins.
             trailing: Where the other foot will be then.
             velocity: Of the walk.
-            stance_width: [m].
         """
         p = self._parameters
-        steps = plan_footsteps(stance, velocity, p.step_time, stance_width, self._steps_left)[:-1]
-        if self._find(stance, trailing, steps) is not None:
-            return ""
+        for pace in PACES:
+            steps = self._steps(stance, velocity, pace, self._steps_left)[:-1]
+            if self._find(stance, trailing, steps) is not None:
+                return ""
+        steps = self._steps(stance, velocity, 1.0, self._steps_left)[:-1]
         places = [
             before.pose.inverse() @ self._contact
             for before, step in zip([stance, *steps[:-1]], steps, strict=True)
@@ -126,17 +131,18 @@ class WalkingKick:
             self.finished = True  # that foot has landed: this is the step after
         if self.finished:
             return steps
-        index = self._find(stance, trailing, steps[:-1])
         self._steps_left -= 1
-        if index is None:
-            if self._steps_left <= 0 or self.refusal(stance, trailing, velocity, self._parameters.stance_width):
-                self.abandon("the ball came out of reach of the steps that were left")
-            return steps
-        self._kicks_now = index == 0
-        kicking = Footstep(self.side, self._landing)
-        p = self._parameters
-        rest = plan_footsteps(kicking, velocity, p.step_time, p.stance_width, len(steps) - index - 2)
-        return [*steps[:index], kicking, *rest]
+        for pace in PACES:
+            tried = steps if pace == 1.0 else self._steps(stance, velocity, pace, len(steps) - 1)
+            index = self._find(stance, trailing, tried[:-1])
+            if index is not None:
+                self._kicks_now = index == 0
+                kicking = Footstep(self.side, self._landing)
+                rest = self._steps(kicking, velocity, 1.0, len(steps) - index - 2)
+                return [*tried[:index], kicking, *rest]
+        if self._steps_left <= 0 or self.refusal(stance, trailing, velocity):
+            self.abandon("the ball came out of reach of the steps that were left")
+        return steps
 
     def swing(self, start: Pose2D, duration: float) -> KickSwing | None:
         """Return the path of the foot if the step that swings now is the kick."""
@@ -153,6 +159,12 @@ class WalkingKick:
             p.landing_speed,
         )
         return self._swing
+
+    def _steps(self, stance: Footstep, velocity: Velocity, pace: float, count: int) -> list[Footstep]:
+        p = self._parameters
+        return plan_footsteps(
+            stance, (pace * velocity[0], velocity[1], velocity[2]), p.step_time, p.stance_width, count
+        )
 
     def _find(self, stance: Footstep, trailing: Pose2D, steps: Sequence[Footstep]) -> int | None:
         """Return the first step whose foot can swing through the ball."""

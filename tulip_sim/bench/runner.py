@@ -24,6 +24,7 @@ class Bench:
         trials: What to run, as arguments of `measure`; each is independent of the others.
         measure: Runs one trial; a function of a module, so that other processes can call it.
         summarize: Turns the rows into markdown lines: what was asked, what came out.
+        draw: Writes docs/results/NAME.png from the rows.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Bench:
     trials: Sequence[tuple[Any, ...]]
     measure: Callable[..., Row]
     summarize: Callable[[list[Row]], list[str]]
+    draw: Callable[[Sequence[Row], Path], None] | None = None
 
 
 def run(bench: Bench, workers: int | None = None, done: Callable[[Row], None] | None = None) -> list[Row]:
@@ -75,5 +77,8 @@ def write_results(benches: Sequence[Bench], folder: Path, page: Path) -> None:
         path = folder / f"{bench.name}.json"
         if path.exists():
             rows = json.loads(path.read_text())["rows"]
-            lines += ["", f"## {bench.title} (`{bench.name}`)", "", *bench.summarize(rows)]
+            lines += ["", f"## {bench.title} (`{bench.name}`)", ""]
+            if (folder / f"{bench.name}.png").exists():
+                lines += [f"![{bench.title}]({folder.name}/{bench.name}.png)", ""]
+            lines += bench.summarize(rows)
     page.write_text("\n".join(lines) + "\n")
