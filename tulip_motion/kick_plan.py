@@ -18,7 +18,8 @@ from tulip_motion.parameters import MotionParameters
 Array = NDArray[np.float64]
 Point = tuple[float, float]
 
-RUN_UP_STEP = 0.01  # [m] by which the run-up is shortened until the foot passes the other one
+WAY_STEP = 0.01  # [m] by which run-up and follow-through are shortened until they fit
+SHORTEST_FOLLOW_THROUGH = 0.06  # [m] in which a foot of 1.5 m/s stops with 3 g
 CLEARANCE_STEP = 0.02  # [m] of the path between two looks at the room beside the other foot
 
 
@@ -112,17 +113,22 @@ def plan_kick(
             f" {expected[1]:.2f}) m, seen along {style.straight:.2f} rad"
         )
     contact = face.sole_at_contact(ball, goal.direction, p.ball_radius)
+    where = f"its swing along {goal.direction:.2f} rad through the ball at ({ball[0]:.2f}, {ball[1]:.2f}) m"
+    follow = style.follow_through
+    while not _in_leg_reach(p, goal, feet, contact, follow):
+        follow -= WAY_STEP
+        if follow < SHORTEST_FOLLOW_THROUGH:
+            return f"the {goal.side.name.lower()} leg is too short for {where}"
     run_up = style.run_up
     while True:
-        moves = _moves(p, style, goal, home, contact, run_up)
-        if _clear(moves, p.kick_clearance, soles[goal.side], feet[goal.side.other], soles[goal.side.other]):
+        moves = _moves(p, goal.speed / style.speed_ratio, goal.direction, home, contact, run_up, follow)
+        reached = _in_leg_reach(p, goal, feet, contact, -run_up)
+        if reached and _clear(moves, p.kick_clearance, soles[goal.side], feet[goal.side.other], soles[goal.side.other]):
             return moves
-        run_up -= RUN_UP_STEP
+        run_up -= WAY_STEP
         if run_up < style.shortest_run_up:
-            return (
-                f"the {goal.side.name.lower()} foot would touch the other one on its way along {goal.direction:.2f} rad"
-                f" to the ball at ({ball[0]:.2f}, {ball[1]:.2f}) m"
-            )
+            what = "foot would touch the other one on" if reached else "leg is too short for"
+            return f"the {goal.side.name.lower()} {what} {where}"
 
 
 def out_of_reach(ball: Point, expected: Point, style: KickStyle) -> bool:
@@ -132,20 +138,35 @@ def out_of_reach(ball: Point, expected: Point, style: KickStyle) -> bool:
     return not (-near <= along <= far and abs(across) <= sideways)
 
 
+def _in_leg_reach(
+    p: MotionParameters, goal: KickGoal, feet: tuple[Pose2D, Pose2D], contact: Pose2D, way: float
+) -> bool:
+    """Tell whether the leg reaches a place `way` [m] beyond the contact: with a straight knee the swing would jerk."""
+    x, y = Pose2D(contact.x, contact.y, goal.direction).transform((way, 0.0))
+    forward, left = feet[goal.side.other].inverse().transform((x, y))
+    outward = left if goal.side is Side.LEFT else -left
+    return abs(forward) <= p.max_stride and outward <= p.max_foot_distance
+
+
 def _moves(
-    p: MotionParameters, style: KickStyle, goal: KickGoal, home: Pose2D, contact: Pose2D, run_up: float
+    p: MotionParameters,
+    foot_speed: float,
+    direction: float,
+    home: Pose2D,
+    contact: Pose2D,
+    run_up: float,
+    follow_through: float,
 ) -> tuple[Move, ...]:
-    forward = np.array([math.cos(goal.direction), math.sin(goal.direction), 0.0, 0.0])
+    along = np.array([math.cos(direction), math.sin(direction), 0.0, 0.0])
     ground = np.array([home.x, home.y, 0.0, home.yaw])
     over = ground + np.array([0.0, 0.0, p.kick_height, 0.0])
     # The yaw is unwrapped, so that the foot takes the short way.
     hit = np.array([contact.x, contact.y, p.kick_height, home.yaw + wrap_angle(contact.yaw - home.yaw)])
-    foot_speed = goal.speed / style.speed_ratio
-    back, front = hit - run_up * forward, hit + style.follow_through * forward
+    back, front = hit - run_up * along, hit + follow_through * along
     return (
         Move(ground, back, p.kick_lift_time),
         Move(back, hit, 2.0 * run_up / foot_speed, Profile.FIRST_HALF),
-        Move(hit, front, 2.0 * style.follow_through / foot_speed, Profile.SECOND_HALF),
+        Move(hit, front, 2.0 * follow_through / foot_speed, Profile.SECOND_HALF),
         Move(front, over, p.kick_return_time),
         Move(over, ground, p.kick_lower_time),
     )

@@ -139,6 +139,12 @@ def test_the_foot_goes_through_the_balls_place_along_the_direction_at_the_speed_
     np.testing.assert_allclose(down.end, [home.x, home.y, 0.0, home.yaw], atol=1e-12)
 
 
+def test_the_way_beyond_a_far_ball_is_shortened_to_what_the_leg_reaches() -> None:
+    *_, follow, _, _ = moves_of(KickGoal(Side.RIGHT, -1.37, 1.7, KickKind.SIDE, (0.10, -0.38)))
+    assert abs(follow.end[1] - FEET[0].y) <= P.max_foot_distance
+    assert np.linalg.norm(follow.end - follow.start) < P.side_kick_follow_through - 0.02
+
+
 @pytest.mark.parametrize("side", Side)
 def test_a_side_kick_keeps_clear_of_the_other_foot_and_meets_the_ball_with_its_outer_side(side: Side) -> None:
     outward = 1.0 if side is Side.LEFT else -1.0
@@ -160,14 +166,18 @@ LEFT = Side.LEFT
     [
         (KickGoal(LEFT, speed=9.0), "speed is 9.00 m/s; expected above 0 and at most 3.5 m/s"),
         (KickGoal(LEFT, speed=float("nan")), "speed is nan"),
-        (KickGoal(LEFT, direction=2.0), "direction is 2.00 rad; expected within 0.5 rad of 0.00 rad"),
+        (KickGoal(LEFT, direction=2.0), "direction is 2.00 rad; expected within 0.4 rad of 0.00 rad"),
         (KickGoal(LEFT, 0.0, 1.5, KickKind.SIDE), "direction is 0.00 rad; expected within 0.4 rad of 1.57 rad"),
         (KickGoal(LEFT, -1.57, 1.5, KickKind.SIDE), "expected within 0.4 rad of 1.57 rad"),
         (KickGoal(LEFT, 1.57, 3.0, KickKind.SIDE), "speed is 3.00 m/s; expected above 0 and at most 2.0 m/s"),
         (KickGoal(LEFT, ball=(0.6, 0.12)), r"ball is at \(0.60, 0.12\) m, out of reach of the left foot; expected at"),
         (KickGoal(LEFT, ball=(0.34, -0.12)), r"out of reach of the left foot.*from \(0.34, 0.12\) m"),
         (KickGoal(LEFT, ball=(0.34, float("inf"))), "expected two finite numbers"),
-        (KickGoal(LEFT, direction=0.4, ball=(0.34, 0.08)), "left foot would touch the other one on its way along 0.40"),
+        (
+            KickGoal(LEFT, direction=0.4, ball=(0.34, 0.08)),
+            "left foot would touch the other one on its swing along 0.40",
+        ),
+        (KickGoal(LEFT, direction=-0.4, ball=(0.34, 0.17)), "left leg is too short for its swing along -0.40 rad"),
     ],
 )
 def test_what_cannot_be_kicked_is_refused_in_words(goal: KickGoal, words: str) -> None:
