@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 WAY_STEP = 0.01  # [m] by which run-up and follow-through are shortened until they fit
+# [m] where the kicking leg's hip is, ahead of and outside the standing ankle, while the CoM is over the standing foot:
+# hips are 0.267 m apart and the CoM falls 0.01 m inside that ankle.
+HIP = (0.018, 0.143)
 SHORTEST_FOLLOW_THROUGH = 0.06  # [m] in which a foot of 1.5 m/s stops with 3 g
 CLEARANCE_STEP = 0.02  # [m] of the path between two looks at the room beside the other foot
 
@@ -141,11 +144,11 @@ def out_of_reach(ball: Point, expected: Point, style: KickStyle) -> bool:
 def _in_leg_reach(
     p: MotionParameters, goal: KickGoal, feet: tuple[Pose2D, Pose2D], contact: Pose2D, way: float
 ) -> bool:
-    """Tell whether the leg reaches a place `way` [m] beyond the contact: with a straight knee the swing would jerk."""
+    """Tell whether the leg reaches a place `way` [m] beyond the contact: with a straight knee it falls."""
     x, y = Pose2D(contact.x, contact.y, goal.direction).transform((way, 0.0))
     forward, left = feet[goal.side.other].inverse().transform((x, y))
     outward = left if goal.side is Side.LEFT else -left
-    return abs(forward) <= p.max_stride and outward <= p.max_foot_distance
+    return math.hypot(forward - HIP[0], outward - HIP[1]) <= p.kick_leg_reach
 
 
 def _moves(

@@ -55,6 +55,7 @@ class MotionParameters:
     kick_reach_near: float = 0.06  # [m] the ball may lie nearer than expected
     kick_reach_far: float = 0.07  # [m] farther
     kick_reach_across: float = 0.06  # [m] to either side
+    kick_leg_reach: float = 0.29  # [m] of the foot from below its hip, seen from above; it falls with 0.316
     kick_clearance: float = 0.01  # [m] between the feet, seen from above: a kicking foot is lower than a foot is high
     kick_torso_turn: float = 3.0  # [rad/m^2] by the area that the foot sweeps; at 0 the stance foot slips by 3 deg
     kick_slip_time: float = 0.012  # [s] smoothing of the stance foot's measured yaw
