@@ -110,9 +110,7 @@ class Walking:
             return
         steps = plan_footsteps(self._straightened(stance), self.velocity, p.step_time, p.stance_width, PREVIEW_STEPS)
         if self.kick is not None:
-            if wanted is None:
-                self.kick.abandon("the robot was told to stop walking")
-            steps = self.kick.adapt(stance, self.feet[stance.side.other].pose, steps, self.velocity)
+            steps = self.kick.adapt(stance, self.feet[stance.side.other].pose, steps, self.velocity, wanted is None)
         self._heading = steps[0].pose.yaw
         self._target = self._nominal = steps[0].pose
         swing_time = p.step_time - p.double_support_time

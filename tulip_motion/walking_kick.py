@@ -118,7 +118,9 @@ class WalkingKick:
             f" turned by at most {p.max_walking_kick_direction} rad"
         )
 
-    def adapt(self, stance: Footstep, trailing: Pose2D, steps: list[Footstep], velocity: Velocity) -> list[Footstep]:
+    def adapt(
+        self, stance: Footstep, trailing: Pose2D, steps: list[Footstep], velocity: Velocity, stopping: bool
+    ) -> list[Footstep]:
         """Return the footsteps with the kicking one among them moved to where it lands; called as each step begins.
 
         Args:
@@ -126,9 +128,12 @@ class WalkingKick:
             trailing: Where the other foot is.
             steps: The plan; the first is the step that begins now.
             velocity: Of the walk.
+            stopping: The robot has been told to stop walking.
         """
         if self._kicks_now:
             self.finished = True  # that foot has landed: this is the step after
+        elif stopping:
+            self.abandon("the robot was told to stop walking")
         if self.finished:
             return steps
         self._steps_left -= 1

@@ -169,6 +169,21 @@ def test_a_walking_kick_ends_with_a_reason_when_the_robot_is_told_to_stop() -> N
     assert (progress.running, progress.reason) == (False, "the robot was told to stop walking")
 
 
+def test_a_walking_kick_under_way_is_carried_out_although_the_robot_is_told_to_stop() -> None:
+    body = walking((0.7, 0.12))
+    assert body.motion.start_kick(KickGoal(Side.LEFT, 0.0, 1.4, KickKind.WALKING, (0.7, 0.12))) == ""
+    for _ in range(1000):
+        progress = body.motion.kick_progress
+        if progress is None or progress.phase > 0.1:
+            break
+        body.go(0.004, WALK)
+    body.go(3.0)
+    progress = body.motion.kick_progress
+    assert progress is not None
+    assert (body.motion.mode, progress.running, progress.reason) == (MotionMode.STAND, False, "")
+    assert body.ball_speed > 1.0
+
+
 def test_a_kick_ends_with_the_reason_of_limpness() -> None:
     body = standing((0.34, 0.12))
     assert body.motion.start_kick(KickGoal(Side.LEFT)) == ""
