@@ -95,7 +95,7 @@ def test_a_walking_kick_sends_the_ball_ahead_and_the_robot_walks_on(side: Side) 
 
 # The weight is shifted until 0.8 s, the foot lifted and taken back until 1.15 s; it meets the ball at about 1.3 s, has
 # slowed down at 1.45 s and stands at 2.2 s; the weight is back at 2.8 s.
-@pytest.mark.parametrize("moment", [0.05, 0.5, 0.79, 0.85, 1.0, 1.14, 1.2, 1.25, 1.29, 1.32, 1.4, 1.6, 2.0, 2.5])
+@pytest.mark.parametrize("moment", [0.05, 0.79, 0.85, 1.0, 1.14, 1.25, 1.29, 1.32, 1.6, 2.5])
 def test_a_forward_kick_can_be_cancelled_in_every_phase_and_the_robot_stands(moment: float) -> None:
     body = standing((0.34, 0.12))
     assert body.motion.start_kick(KickGoal(Side.LEFT, 0.0, 3.2)) == ""
@@ -112,7 +112,7 @@ def test_a_forward_kick_can_be_cancelled_in_every_phase_and_the_robot_stands(mom
     assert body.motion.cancel_kick() == "no kick is under way"
 
 
-@pytest.mark.parametrize("moment", [0.6, 1.05, 1.2, 1.3, 1.5])
+@pytest.mark.parametrize("moment", [1.05, 1.25, 1.32])
 def test_a_side_kick_can_be_cancelled_in_every_phase_and_the_robot_stands(moment: float) -> None:
     body = standing((0.112, -0.34))
     assert body.motion.start_kick(KickGoal(Side.RIGHT, -0.5 * math.pi, 1.7, KickKind.SIDE)) == ""
@@ -123,7 +123,7 @@ def test_a_side_kick_can_be_cancelled_in_every_phase_and_the_robot_stands(moment
     assert body.greatest_tilt < 0.1
 
 
-@pytest.mark.parametrize("phase", [0.0, 0.2, 0.5, 0.8])
+@pytest.mark.parametrize("phase", [0.0, 0.3, 0.7])
 def test_a_walking_kick_can_be_cancelled_and_the_robot_walks_on(phase: float) -> None:
     body = walking((0.7, 0.12))
     assert body.motion.start_kick(KickGoal(Side.LEFT, 0.0, 1.4, KickKind.WALKING, (0.7, 0.12))) == ""
