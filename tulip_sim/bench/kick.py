@@ -138,7 +138,7 @@ def _line(kind: KickKind, told: bool, rows: list[Row]) -> str:
 
 def draw(rows: Sequence[Row], path: Path) -> None:
     """Draw where the balls went, by kind: velocity of the ball in the robot's axes, forward up."""
-    figure = Figure(figsize=(12.0, 4.2), layout="constrained")
+    figure = Figure(figsize=(12.0, 4.4), layout="constrained")
     for kind, axes in zip(KickKind, figure.subplots(1, len(KickKind)), strict=True):
         axes.set_title(f"{kind.name.lower()} kick")
         own = [row for row in rows if row["kind"] == kind.name.lower() and not row["refusal"]]
@@ -159,8 +159,9 @@ def draw(rows: Sequence[Row], path: Path) -> None:
                         markersize=4.0,
                     )
         reach = 1.15 * max((row["ball speed [m/s]"] for row in own), default=1.0)
-        low = -0.5 * reach if kind is KickKind.SIDE else -0.05 * reach
-        axes.set(xlim=(-reach, reach), ylim=(low, reach), aspect="equal", xlabel="right [m/s]", ylabel="forward [m/s]")
+        across, low, high = (1.0, -0.5, 0.5) if kind is KickKind.SIDE else (0.5, -0.05, 1.0)
+        axes.set(xlim=(-across * reach, across * reach), ylim=(low * reach, high * reach), aspect="equal")
+        axes.set(xlabel="right [m/s]", ylabel="forward [m/s]")
     figure.suptitle("Ball's velocity after the kick; dashed: wanted direction; circles: left foot, squares: right foot")
     figure.savefig(path, dpi=110)
 
