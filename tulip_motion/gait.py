@@ -61,6 +61,7 @@ class Reference:
         torso_yaw, torso_yaw_rate: [rad], [rad/s].
         phase: Progress of the step or kick, 0 to 1.
         com: What the CoM follows in open loop; without it, it is led by the feedback of the ZMP.
+        torso_yaw_acceleration: [rad/s^2].
     """
 
     support: Support
@@ -72,6 +73,7 @@ class Reference:
     torso_yaw_rate: float
     phase: float
     com: ComMotion | None = None
+    torso_yaw_acceleration: float = 0.0
 
 
 def support_on(side: Side) -> Support:

@@ -85,6 +85,21 @@ class KickGoal:
     ball: tuple[float, float] | None = None
 
 
+@dataclass(frozen=True)
+class KickProgress:
+    """How far a kick has come.
+
+    Attributes:
+        running: Whether it is under way still.
+        phase: Progress, 0 to 1.
+        reason: Why it was not or will not be carried out, or "".
+    """
+
+    running: bool
+    phase: float
+    reason: str
+
+
 class MotionMode(IntEnum):
     """What motion control does at present."""
 

@@ -1,130 +1,187 @@
-"""The kick: swing foot trajectories with cosine velocity profiles."""
+"""A kick from standing: shift the weight, swing through the ball, stand again; or give it up on the way."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from tulip_description.planar import Pose2D
+from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import FootMotion, Reference, sole_point, support_on
-from tulip_motion.interface import KickGoal, Support
+from tulip_motion.interface import Support
+from tulip_motion.kick_path import FootPath, Move, brake
 from tulip_motion.lipm import DcmPlan, time_constant
 from tulip_motion.parameters import MotionParameters
 
-Point = tuple[float, float, float]
-
-
-def cosine_profile(time: float, duration: float) -> tuple[float, float, float]:
-    """Return progress, rate and acceleration of a move whose speed follows 1 - cos(2 pi t / T).
-
-    Progress goes from 0 to 1; speed and acceleration are zero at both ends; the peak speed is 2 / T.
-    """
-    t = min(max(time, 0.0), duration)
-    w = 2.0 * math.pi / duration
-    return (t - math.sin(w * t) / w) / duration, (1.0 - math.cos(w * t)) / duration, w * math.sin(w * t) / duration
-
 
 class Kick:
-    """Shifts onto the other foot, swings the kicking foot back and through the ball, and stands again."""
+    """Shifts onto the other foot, swings the kicking foot back and through the ball, and stands again.
+
+    Two things keep the swing on its line although the carpet holds the stance foot only by friction. The torso turns
+    against the swinging leg, so that less of the leg's angular momentum has to come from the ground; and what the
+    stance foot turns nevertheless is measured by the IMU, and taken out of the swing.
+    """
 
     def __init__(
         self,
         parameters: MotionParameters,
-        goal: KickGoal,
+        moves: Sequence[Move],
         feet: tuple[Footstep, Footstep],
+        kicking: Footstep,
         zmp: tuple[float, float],
     ) -> None:
         """Begin from double support.
 
         Args:
             parameters: Of motion control.
-            goal: Foot, direction and speed.
+            moves: Of the kicking foot, in odom: lift, run-up, follow-through, return, lowering.
             feet: Left and right foot as they stand.
+            kicking: The foot that kicks, one of them.
             zmp: Where the ZMP is now, in odom [m].
         """
         p = self._parameters = parameters
         self._time_constant = time_constant(p.com_height)
-        self.side = goal.side
+        self.side = kicking.side
         self._feet = [feet[0], feet[1]]
-        self._stance = feet[goal.side.other]
-        self._start = feet[goal.side].pose
+        self._stance = feet[self.side.other]
+        self._start = kicking.pose
+        self._moves = tuple(moves)
+        self._path = FootPath(moves, p.landing_speed)
         self.finished = False
+        self.reason = ""
+        """Why the kick was given up, or ""."""
         self._time = 0.0
+        self._air_time = 0.0
+        """[s] on the present path."""
         self._down_at: float | None = None
-        heading = self._stance.pose.yaw + goal.direction
-        forward = np.array([math.cos(heading), math.sin(heading), 0.0])
-        ground = np.array([self._start.x, self._start.y, 0.0])
-        raised = np.array([0.0, 0.0, p.kick_height])
-        back = ground + raised - p.kick_backswing * forward
-        front = ground + raised + p.kick_follow_through * forward
-        swing_time = 2.0 * (p.kick_backswing + p.kick_follow_through) / goal.speed
-        self._path = [
-            (ground, back, p.kick_lift_time),
-            (back, front, swing_time),
-            (front, ground + raised, p.kick_return_time),
-            (ground + raised, ground, p.kick_lower_time),
-        ]
-        self._swing_end = p.kick_shift_time + sum(duration for _, _, duration in self._path)
+        self._heading = self._stance.pose.yaw
+        self._torso_yaw = self._heading + 0.5 * wrap_angle(self._start.yaw - self._heading)
+        self._measured_yaw = self._heading
         aim = sole_point(self._stance, p.zmp_forward, p.kick_zmp_inward)
         # The DCM has to be over the foot, at rest, when the foot lifts: end the plan there.
         self._plan = DcmPlan([0.0, p.kick_shift_time], [zmp, aim], self._time_constant)
+        self._total = p.kick_shift_time + self._path.duration + p.stop_shift_time
 
     @property
     def feet(self) -> tuple[Footstep, Footstep]:
         """Left and right foot as they stand now."""
         return self._feet[0], self._feet[1]
 
-    def tick(self, dt: float, landed: Pose2D, loads: tuple[float, float]) -> Reference:
+    @property
+    def _in_air(self) -> bool:
+        return self._time >= self._parameters.kick_shift_time and self._down_at is None
+
+    def cancel(self, reason: str) -> None:
+        """Give the kick up: stand at once if the foot is down still, else brake it, take it back and put it down.
+
+        A foot that has met the ball goes on as planned: it slows down and comes back.
+        """
+        if self.finished or self.reason:
+            return
+        self.reason = reason
+        if self._down_at is not None:
+            return
+        if not self._in_air:
+            self._begin_to_stand()
+            return
+        lift, run_up, follow, back, lower = self._moves
+        if self._air_time >= lift.duration + run_up.duration:
+            return
+        p = self._parameters
+        foot, time = self._path.evaluate(self._air_time), p.kick_brake_time
+        if self._air_time > lift.duration:
+            # No farther than the follow-through would lead: beyond it the leg is too long and the robot falls.
+            left = float(np.linalg.norm(follow.end[:3] - foot.position))
+            time = min(time, 2.0 * left / max(float(np.linalg.norm(foot.velocity)), 1e-6))
+        stop = brake(foot, time)
+        self._path = FootPath((stop, replace(back, start=stop.end), lower), p.landing_speed)
+        self._air_time = 0.0
+
+    def abandon(self, reason: str) -> None:
+        """End the kick because the robot has fallen or has gone limp."""
+        if not self.finished:
+            self.finished, self.reason = True, self.reason or reason
+
+    @property
+    def phase(self) -> float:
+        """Progress, 0 to 1."""
+        return 1.0 if self.finished else min(self._time / self._total, 1.0)
+
+    def tick(self, dt: float, landed: Sequence[Pose2D], loads: tuple[float, float]) -> Reference:
         """Advance by one tick.
 
         Args:
             dt: [s].
-            landed: Where the kicking foot is now, as measured, in odom; used when it touches down.
+            landed: Where the left and right sole are now, as measured, in odom.
             loads: Vertical force on the left and right sole [N].
         """
         p = self._parameters
         self._time += dt
-        in_air = p.kick_shift_time <= self._time and self._down_at is None
-        lowering = self._time > self._swing_end - p.kick_lower_time * (1.0 - p.contact_phase)
-        late = self._time > self._swing_end + p.late_contact_time * 2.0
-        if in_air and lowering and (loads[self.side] > p.contact_force or late):
-            self._land(landed)
-            in_air = False
+        if self._in_air:
+            self._air_time += dt
+            left = self._path.duration - self._air_time
+            lowering = left < p.kick_lower_time * (1.0 - p.contact_phase)
+            late = left < -2.0 * p.late_contact_time
+            if lowering and (loads[self.side] > p.contact_force or late):
+                self._feet = [Footstep(foot.side, landed[foot.side]) for foot in self._feet]
+                self._stance = self._feet[self.side.other]
+                self._begin_to_stand()
         elapsed = self._time - (self._down_at or 0.0)
         zmp, dcm = self._plan.evaluate(elapsed)
         if self._down_at is not None:
             self.finished = elapsed > p.stop_shift_time
-        foot = self._swing() if in_air else FootMotion.resting(self._feet[self.side].pose)
-        total = self._swing_end + p.stop_shift_time
+        if not self._in_air:
+            foot = FootMotion.resting(self._feet[self.side].pose)
+            yaw = self._stance.pose.yaw + 0.5 * wrap_angle(foot.yaw - self._stance.pose.yaw)
+            return Reference(Support.DOUBLE, self._stance, foot, zmp, dcm, yaw, 0.0, self.phase)
+        foot = self._path.evaluate(self._air_time)
+        stance = self._turned_stance(landed[self._stance.side].yaw, dt)
+        rate, acceleration = self._turn_torso(foot, dt)
         return Reference(
-            support_on(self._stance.side) if in_air else Support.DOUBLE,
-            self._stance,
+            support_on(stance.side),
+            stance,
             foot,
             zmp,
             dcm,
-            self._stance.pose.yaw + 0.5 * math.remainder(foot.yaw - self._stance.pose.yaw, 2.0 * math.pi),
-            0.0,
-            min(self._time / total, 1.0),
+            self._torso_yaw,
+            rate,
+            self.phase,
+            torso_yaw_acceleration=acceleration,
         )
 
-    def _land(self, landed: Pose2D) -> None:
+    def _turned_stance(self, measured_yaw: float, dt: float) -> Footstep:
+        """Return the stance foot with the yaw that it has slipped to, smoothed."""
+        share = min(dt / self._parameters.kick_slip_time, 1.0)
+        self._measured_yaw += share * wrap_angle(measured_yaw - self._measured_yaw)
+        pose = self._stance.pose
+        return Footstep(self._stance.side, Pose2D(pose.x, pose.y, self._measured_yaw))
+
+    def _turn_torso(self, foot: FootMotion, dt: float) -> tuple[float, float]:
+        """Turn the torso against the foot's motion about the stance foot; return its rate and acceleration."""
+        gain = -self._parameters.kick_torso_turn
+        lever = foot.position[:2] - (self._stance.pose.x, self._stance.pose.y)
+        rate = gain * float(lever[0] * foot.velocity[1] - lever[1] * foot.velocity[0])
+        self._torso_yaw += dt * rate
+        return rate, gain * float(lever[0] * foot.acceleration[1] - lever[1] * foot.acceleration[0])
+
+    def _begin_to_stand(self) -> None:
         p = self._parameters
         zmp, _ = self._plan.evaluate(self._time)
         self._down_at = self._time
-        self._feet[self.side] = Footstep(self.side, landed)
         left, right = (sole_point(foot, p.zmp_forward, p.zmp_inward) for foot in self._feet)
         middle = ((left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0)
         self._plan = DcmPlan([0.0, p.stop_shift_time], [zmp, middle], self._time_constant)
 
-    def _swing(self) -> FootMotion:
-        time = self._time - self._parameters.kick_shift_time
-        for start, end, duration in self._path:
-            if time <= duration:
-                progress, rate, acceleration = cosine_profile(time, duration)
-                way = end - start
-                return FootMotion(start + progress * way, rate * way, acceleration * way, self._start.yaw)
-            time -= duration
-        down = np.array([0.0, 0.0, -self._parameters.landing_speed])
-        return FootMotion(self._path[-1][1] + time * down, down, np.zeros(3), self._start.yaw)
+
+def moved(move: Move, base: Pose2D) -> Move:
+    """Return a move given in base_footprint as one in odom, where base_footprint is at `base`."""
+
+    def four(
+        point: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
+    ) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+        x, y = base.transform(point[:2])
+        return np.array([x, y, point[2], point[3] + base.yaw])
+
+    return replace(move, start=four(move.start), end=four(move.end))

@@ -20,6 +20,8 @@ from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import FootMotion, Reference, sole_point
 from tulip_motion.interface import (
     KickGoal,
+    KickKind,
+    KickProgress,
     MotionMode,
     MotionState,
     Odometry,
@@ -30,7 +32,8 @@ from tulip_motion.interface import (
 )
 from tulip_motion.inverse_kinematics import InverseKinematics, TaskTarget, orientation_error, rotation_z
 from tulip_motion.joint_control import JointGains, feedback
-from tulip_motion.kick import Kick
+from tulip_motion.kick import Kick, moved
+from tulip_motion.kick_plan import plan_kick, refused_numbers
 from tulip_motion.learning_file import LearningFile
 from tulip_motion.lipm import time_constant
 from tulip_motion.odometry import DeadReckoning, StanceTwist
@@ -41,6 +44,7 @@ from tulip_motion.stabilizer import Balance, stabilize
 from tulip_motion.state_estimator import Estimate, StateEstimator, planar_pose
 from tulip_motion.step_learning import StepLearner
 from tulip_motion.walking import Walking, must_step
+from tulip_motion.walking_kick import WalkingKick
 
 Array = NDArray[np.float64]
 
@@ -67,6 +71,7 @@ class Motion:
             self._model, p.clik_gain_position, p.clik_gain_orientation, p.clik_damping, robot.position_limits[:, :12]
         )
         self._gains = JointGains(p)
+        self._soles = robot.feet
         self._effort_limits = robot.effort_limits[:12]
         self._reach = reach(p, robot)
         self._omega = 1.0 / time_constant(p.com_height)
@@ -74,6 +79,7 @@ class Motion:
         self._mode = MotionMode.STAND
         self._reason = ""
         self._gait: Walking | PaperGait | Kick | None = None
+        self._kick: Kick | WalkingKick | None = None
         self._steps_before = 0
         self._started = False
         self._sequence = 0
@@ -124,16 +130,51 @@ class Motion:
 
     def start_kick(self, goal: KickGoal) -> str:
         """Begin a kick; return "" or the reason why not."""
-        p = self._parameters
+        if self._kick is not None and not self._kick.finished:
+            return "another kick is under way"
+        if goal.kind is KickKind.WALKING:
+            return self._start_walking_kick(goal)
         if self._mode is not MotionMode.STAND or not self._started:
-            return f"motion is in mode {self._mode.name}; a kick starts from STAND"
-        if not 0.0 < goal.speed <= p.max_kick_speed:
-            return f"speed is {goal.speed} m/s; expected above 0 and at most {p.max_kick_speed} m/s"
-        if not abs(goal.direction) <= p.max_kick_direction:
-            return f"direction is {goal.direction} rad; expected within +-{p.max_kick_direction} rad"
-        self._gait = Kick(p, goal, self._feet(), self._middle())
+            return f"motion is in mode {self._mode.name}; a {goal.kind.name.lower()} kick starts from STAND"
+        p, feet = self._parameters, self._feet()
+        base = self._base_footprint()
+        left, right = (base.inverse() @ foot.pose for foot in feet)
+        plan = plan_kick(p, goal, (left, right), self._soles)
+        if isinstance(plan, str):
+            return plan
+        self._gait = self._kick = Kick(p, [moved(move, base) for move in plan], feet, feet[goal.side], self._middle())
         self._mode = MotionMode.KICK
         return ""
+
+    def cancel_kick(self) -> str:
+        """Give the running kick up as its phase allows; return "" or the reason why not."""
+        if self._kick is None or self._kick.finished:
+            return "no kick is under way"
+        self._kick.cancel("cancelled on request")
+        return ""
+
+    @property
+    def kick_progress(self) -> KickProgress | None:
+        """How far the last kick that was started has come; None before the first."""
+        kick = self._kick
+        return None if kick is None else KickProgress(not kick.finished, kick.phase, kick.reason)
+
+    def _start_walking_kick(self, goal: KickGoal) -> str:
+        p = self._parameters
+        if self._mode is not MotionMode.WALK or not isinstance(self._gait, Walking):
+            return f"motion is in mode {self._mode.name}; a walking kick starts from WALK"
+        if goal.ball is None:
+            return "no place of the ball is given; a walking kick needs it to find the step that reaches it"
+        refusal = refused_numbers(goal, p.max_walking_kick_speed, 0.0, p.max_walking_kick_direction)
+        if refusal:
+            return refusal
+        base = self._base_footprint()
+        ball, direction = base.transform(goal.ball), base.yaw + goal.direction
+        kick = WalkingKick(p, self._reach, goal.side, ball, direction, goal.speed, self._soles)
+        refusal = self._gait.kick_next(kick)
+        if not refusal:
+            self._kick = kick
+        return refusal
 
     def tick(self, sensors: Sensors) -> JointCommand:
         """Return the command for the legs that answers one reading of the sensors."""
@@ -143,6 +184,8 @@ class Motion:
             self._start(estimate)
         self._change_mode(estimate)
         if self._mode in (MotionMode.LIMP, MotionMode.FALLEN):
+            if self._kick is not None:
+                self._kick.abandon(self._reason)
             return self._limp(estimate)
         reference = self._reference = self._advance_gait(estimate)
         self._plan_com(reference)
@@ -205,6 +248,11 @@ class Motion:
         if self._learner is not None:
             self._learning_file.save()
 
+    def _base_footprint(self) -> Pose2D:
+        """Return where base_footprint is in odom."""
+        position, rotation = self._estimate.base_position, self._estimate.base_rotation
+        return Pose2D(float(position[0]), float(position[1]), math.atan2(rotation[1, 0], rotation[0, 0]))
+
     def _feet(self) -> tuple[Footstep, Footstep]:
         left, right = self._estimator.anchors
         return Footstep(Side.LEFT, left), Footstep(Side.RIGHT, right)
@@ -245,6 +293,8 @@ class Motion:
         elif self._gait is not None and self._gait.finished:
             if isinstance(self._gait, Walking | PaperGait):
                 self._steps_before += self._gait.step_count
+            if isinstance(self._gait, Walking) and self._gait.kick is not None:
+                self._gait.kick.abandon("the walk has ended")
             self._gait = None
             self._mode = MotionMode.STAND
         elif self._mode is MotionMode.STAND and self._wants_to_step(estimate):
@@ -303,7 +353,8 @@ class Motion:
                 self._twist.update(self._estimator.anchors[side], yaw, estimate.zmp)
             return reference
         if isinstance(self._gait, Kick):
-            reference = self._gait.tick(dt, planar_pose(estimate.soles[self._gait.side]), estimate.loads)
+            landed = [planar_pose(sole) for sole in estimate.soles]
+            reference = self._gait.tick(dt, landed, estimate.loads)
             self._anchor(self._gait.feet)
             return reference
         left, right = self._feet()
@@ -386,13 +437,14 @@ class Motion:
         self._torques[1] = torques
         return self._send(positions, velocities, torques + self._torques[2], stiffness, damping)
 
-    def _torso_acceleration(self, estimate: Estimate, torso: Array, yaw_rate: float) -> tuple[float, float, float]:
+    def _torso_acceleration(self, estimate: Estimate, torso: Array, reference: Reference) -> tuple[float, float, float]:
         """Return the (3,) angular acceleration [rad/s^2], odom axes, that brings the torso to its attitude."""
         p = self._parameters
         ex, ey, ez = orientation_error(torso, estimate.base_rotation).tolist()
         wx, wy, wz = estimate.angular_velocity.tolist()
         stiffness, damping = p.torso_stiffness, p.torso_damping
-        return stiffness * ex - damping * wx, stiffness * ey - damping * wy, stiffness * ez + damping * (yaw_rate - wz)
+        turning = reference.torso_yaw_acceleration + damping * (reference.torso_yaw_rate - wz)
+        return stiffness * ex - damping * wx, stiffness * ey - damping * wy, stiffness * ez + turning
 
     def _stand_on(self, stance: Footstep) -> None:
         """Move the desired posture as a whole to a new stance foot, so that its joints take no notice of the change."""
@@ -422,7 +474,7 @@ class Motion:
                 self._omega**2 * (y - balance.zmp[1]),
                 p.height_stiffness * (self._height - z)
                 - p.height_damping * (float(estimate.com_velocity[2]) - height_rate),
-                *self._torso_acceleration(estimate, torso, reference.torso_yaw_rate),
+                *self._torso_acceleration(estimate, torso, reference),
                 *swing,
             )
         )

@@ -60,7 +60,7 @@ class MotionNode(ComponentNode):
             topics.KICK.type,
             topics.KICK.name,
             self._execute_kick,
-            cancel_callback=lambda _: CancelResponse.REJECT,
+            cancel_callback=self._on_cancel,
         )
 
     def begin_anew(self) -> None:
@@ -111,14 +111,22 @@ class MotionNode(ComponentNode):
         self._notes = state.notes
         if state.mode is MotionMode.STAND:
             self._motion.save_learning()
-        if self._kick is None:
+        progress = self._motion.kick_progress
+        if self._kick is None or progress is None:
             return
-        if state.mode is MotionMode.KICK:
-            self._kick.handle.publish_feedback(Kick.Feedback(phase=state.phase))
+        if progress.running:
+            self._kick.handle.publish_feedback(Kick.Feedback(phase=progress.phase))
         else:
-            succeeded = state.mode in (MotionMode.STAND, MotionMode.WALK)
-            self._kick.done.set_result((succeeded, "" if succeeded else state.reason))
+            self._kick.done.set_result((not progress.reason, progress.reason))
             self._kick = None
+
+    def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:
+        """Give the running kick up; its result comes when the robot stands or walks on."""
+        running = self._kick is not None and self._kick.handle.goal_id == handle.goal_id
+        refusal = self._motion.cancel_kick() if running else "this kick is not under way"
+        if refusal:
+            self.health.count("refused cancel", f"cancel refused: {refusal}")
+        return CancelResponse.REJECT if refusal else CancelResponse.ACCEPT
 
     def _on_walk_command(self, message: WalkCommandMessage) -> None:
         try:
@@ -146,7 +154,10 @@ class MotionNode(ComponentNode):
         else:
             self._kick = _RunningKick(handle, Future())
             success, reason = await self._kick.done
-        if success:
+        if handle.is_cancel_requested:
+            success = False
+            handle.canceled()
+        elif success:
             handle.succeed()
         else:
             handle.abort()

@@ -92,11 +92,43 @@ class MotionParameters:
     kick_return_time: float = 0.45  # [s] from the follow-through to over its old place
     kick_lower_time: float = 0.30  # [s]
     kick_height: float = 0.06  # [m] of the sole: the toe meets the ball a little below its centre
-    kick_backswing: float = 0.17  # [m] behind the standing place
-    kick_follow_through: float = 0.23  # [m] ahead of it
+    kick_backswing: float = 0.20  # [m] the foot's run-up to the ball
+    kick_shortest_backswing: float = 0.14  # [m] where the other foot leaves no room for the whole one
+    kick_follow_through: float = 0.20  # [m] the foot's way beyond the contact, to slow down
+    kick_brake_time: float = 0.25  # [s] a kick that is cancelled stops its foot
+    kick_gap: float = 0.03  # [m] between the face of the standing foot and the ball, where a kick expects it
+    kick_reach_near: float = 0.06  # [m] the ball may lie nearer than expected
+    kick_reach_far: float = 0.07  # [m] farther
+    kick_reach_across: float = 0.06  # [m] to either side
+    kick_leg_reach: float = 0.29  # [m] of the foot from below its hip, seen from above; it falls with 0.316
+    kick_clearance: float = 0.01  # [m] between the feet, seen from above: a kicking foot is lower than a foot is high
+    kick_torso_turn: float = 3.0  # [rad/m^2] by the area that the foot sweeps; at 0 the stance foot slips by 3 deg
+    kick_slip_time: float = 0.012  # [s] smoothing of the stance foot's measured yaw
+    kick_speed_ratio: float = 1.13  # ball's speed over the foot's, measured: 1.05 at 1 m/s, 1.16 at 3.6 m/s
+    ball_radius: float = 0.0935  # [m] as in the field's file
     kick_zmp_inward: float = 0.01  # [m] aim point on the stance foot while kicking
-    max_kick_speed: float = 3.5  # [m/s] of the foot, from the joint speed limits
-    max_kick_direction: float = 0.5  # [rad] either side, from the reach of the hip roll
+    max_kick_speed: float = 3.5  # [m/s] of the ball, from torque and speed of the knee
+    max_kick_direction: float = 0.4  # [rad] either side, from the reach of the hip roll
+    side_kick_gap: float = 0.05  # [m] more than ahead, since strategy comes to it sideways
+    side_kick_backswing: float = 0.12  # [m] longest run-up; the other foot leaves less room for most directions
+    side_kick_shortest_backswing: float = 0.06  # [m]
+    side_kick_follow_through: float = 0.12  # [m]
+    side_kick_reach_near: float = 0.05  # [m] the ball may lie nearer than expected
+    side_kick_reach_far: float = 0.05  # [m] farther
+    side_kick_reach_across: float = 0.05  # [m] ahead or behind
+    side_kick_speed_ratio: float = 1.18  # ball's speed over the foot's, measured
+    max_side_kick_speed: float = 2.0  # [m/s] of the ball
+    max_side_kick_direction: float = 0.4  # [rad] either side of straight to the left or right
+    walking_kick_step_time: float = 0.45  # [s] of the step that kicks
+    walking_kick_steps: int = 8  # of the walk within which the ball has to be reached
+    walking_kick_contact: float = 0.6  # share of the swing at which the foot meets the ball
+    walking_kick_run_up: float = 0.08  # [m] least way of the foot to the ball
+    walking_kick_reach_back: float = -0.05  # [m] kicking foot ahead of the standing one at the contact, at least
+    walking_kick_reach_ahead: float = 0.20  # [m] at most
+    walking_kick_reach_side: float = 0.36  # [m] beside it, at most; at least min_foot_distance
+    walking_kick_speed_ratio: float = 1.13  # ball's speed over the foot's, measured
+    max_walking_kick_speed: float = 2.0  # [m/s] of the ball
+    max_walking_kick_direction: float = 0.3  # [rad] of the foot against the standing one
 
     # Balance
     dcm_gain: float = _tuned("dcm_gain")  # k in zmp = ref + (1 + k) (dcm - ref)

@@ -61,7 +61,14 @@ class StepAdjustment:
         self._placement = p.placement_gain * shift / (1.0 - math.exp(-shift))
 
     def solve(
-        self, dcm: Point, planned_at_landing: Point, nominal: Point, foot: Point, remaining: float, latest: float
+        self,
+        dcm: Point,
+        planned_at_landing: Point,
+        nominal: Point,
+        foot: Point,
+        remaining: float,
+        latest: float,
+        fixed_time: bool = False,
     ) -> Landing:
         """Return the best landing.
 
@@ -72,6 +79,7 @@ class StepAdjustment:
             foot: Where the swing foot is now [m].
             remaining: Planned time until landing [s].
             latest: Latest possible time until landing [s].
+            fixed_time: Keep the planned time.
         """
         p = self._parameters
         now = np.array([[dcm[0]], [dcm[1]]])
@@ -79,7 +87,7 @@ class StepAdjustment:
         place = np.array([[nominal[0]], [nominal[1]]])
         times = np.array([remaining])
         cost, places, excess = self._cost(now, then, place, times, remaining)
-        if excess[0] > 0.0:
+        if excess[0] > 0.0 and not fixed_time:
             times = np.arange(
                 p.placement_freeze_time, max(latest, p.placement_freeze_time) + 1e-9, 2.0 * p.control_period
             )

@@ -20,6 +20,7 @@ from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import Reach
 from tulip_motion.stabilizer import nearest_in_support
 from tulip_motion.step_adjustment import StepAdjustment
+from tulip_motion.walking_kick import KickSwing, WalkingKick
 
 
 class Walking:
@@ -48,7 +49,9 @@ class Walking:
         self.finished = False
         self._zmp = zmp
         self._stance: Footstep | None = None
-        self._swing: SwingFoot | None = None
+        self._swing: SwingFoot | KickSwing | None = None
+        self.kick: WalkingKick | None = None
+        """A kick to be done by one of the steps."""
         self._adjustments = [
             StepAdjustment(parameters, reach, self._time_constant, -1.0 if side is Side.LEFT else 1.0) for side in Side
         ]
@@ -57,6 +60,16 @@ class Walking:
     def notes(self) -> tuple[str, ...]:
         """What was taken off the command, in words."""
         return (self.course.note,) if self.course.note else ()
+
+    def kick_next(self, kick: WalkingKick) -> str:
+        """Take a kick for one of the steps after the present one; return "" or the reason why not."""
+        if self._stance is None or self._swing_over:
+            return "the robot is stopping; a walking kick needs a walk that goes on"
+        coming = Footstep(self._stance.side.other, self._target)
+        refusal = kick.refusal(coming, self._stance.pose, self.course.velocity)
+        if not refusal:
+            self.kick = kick
+        return refusal
 
     def tick(
         self,
@@ -122,8 +135,13 @@ class Walking:
         self.step_count += 1
         aim = sole_point(stance, p.zmp_forward, p.zmp_inward)
         steps = self.course.next_steps(stance, wish)
+        step_time = self.course.step_time
+        if self.kick is not None:
+            trailing = self.feet[stance.side.other].pose
+            steps = self.kick.adapt(stance, trailing, steps, self.course.velocity, not isinstance(wish, tuple))
+            step_time = self.kick.step_time or step_time
         self._target = self._nominal = steps[0].pose
-        swing_time = self.course.step_time - p.double_support_time
+        swing_time = step_time - p.double_support_time
         self._landing_time = self._planned_landing_time = shift_time + swing_time
         self._aim = aim
         times, zmps = [0.0, shift_time, self._landing_time], [self._zmp, aim, aim]
@@ -170,7 +188,8 @@ class Walking:
         else:
             if self._swing is None:
                 duration = self._landing_time - self._time
-                self._swing = SwingFoot(trailing.pose, duration, p.swing_height, p.landing_speed)
+                self._swing = self.kick.swing(trailing.pose, duration) if self.kick is not None else None
+                self._swing = self._swing or SwingFoot(trailing.pose, duration, p.swing_height, p.landing_speed)
             if self._landing_time - self._time > p.placement_freeze_time:
                 self._adjust(dcm)
                 zmp, planned = self._planned()
@@ -213,6 +232,8 @@ class Walking:
             beside(foot[0] - pose.x, foot[1] - pose.y),
             self._planned_landing_time - self._time,
             self._planned_landing_time - self._time + p.max_step_extension,
+            # A kick's foot is to be at the ball in time.
+            fixed_time=isinstance(self._swing, KickSwing),
         )
         # Estimates overshoot while the robot is being pushed: let the time follow over some ticks.
         most = p.max_step_time_rate * p.control_period

@@ -69,6 +69,7 @@ class StrategyParameters:
     kick_run_limit: float = 8.0  # [s] a kick lasts about 3 s; longer means that its end was not reported
     kick_speed: float = 3.0  # [m/s] wanted of the ball
     kick_direction_limit: float = 0.2  # [rad] farther sideways the foot cannot swing
+    kick_outward_slope: float = 3.0  # [rad/m] less of it outwards where the other foot stands in the way of the run-up
     kick_range: float = 3.5  # [m] ball to goal; farther, 5 deg of error miss the gap
     kick_range_end: float = 4.0  # [m] keeps a begun alignment when the estimate jumps
     kick_gap: float = 0.22  # [rad] free angle wanted: twice the kick's spread to each side

@@ -13,7 +13,7 @@ from tulip_description.planar import Pose2D
 from tulip_motion.footsteps import Footstep, centre_beside, foot_beside, next_footstep, plan_footsteps
 from tulip_motion.gait import SwingFoot, sole_point
 from tulip_motion.interface import Side
-from tulip_motion.kick import cosine_profile
+from tulip_motion.kick_path import cosine_profile
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.stabilizer import stabilize
 

@@ -10,7 +10,7 @@ import pytest
 
 from tulip_description.planar import Pose2D
 from tulip_description.robot import LEG_JOINTS
-from tulip_motion.interface import KickGoal, MotionMode, Side, WalkCommand, WalkMode
+from tulip_motion.interface import MotionMode, WalkCommand, WalkMode
 from tulip_motion.motion import Motion
 from tulip_motion.parameters import MotionParameters
 from tulip_sim.scenario import Scenario
@@ -28,7 +28,6 @@ class Run:
         self.world = World(Scenario(robot=Pose2D(-2.0, 0.0, 0.0), ball=ball, poles=False), seed=seed)
         self.motion = Motion(MotionParameters(), self.world.robot)
         self._pending = None
-        self.fastest_ball = 0.0
 
     def go(self, seconds: float, command: Callable[[float], WalkCommand] = lambda _: STAND) -> None:
         for k in range(round(seconds / TICK)):
@@ -38,7 +37,6 @@ class Run:
                 assert self.world.apply(self._pending) == ""
             self._pending = answer
             self.world.advance(4)
-            self.fastest_ball = max(self.fastest_ball, float(np.hypot(*self.world.truth().ball_linear_velocity[:2])))
 
 
 def walk(forward: float, left: float = 0.0, turn: float = 0.0) -> Callable[[float], WalkCommand]:
@@ -77,27 +75,6 @@ def test_turns_as_commanded() -> None:
     yaw = run.motion.odometry().orientation
     assert run.motion.mode is MotionMode.WALK
     assert 2.0 * np.arctan2(yaw[2], yaw[3]) == pytest.approx(2.2, abs=0.4)
-
-
-@pytest.mark.parametrize("side", Side)
-def test_kicks_the_ball_at_two_metres_a_second_and_stays_upright(side: Side) -> None:
-    y = 0.12 if side is Side.LEFT else -0.12
-    run = Run(ball=(-2.0 + 0.067 + 0.15 + 0.095 + 0.03, y))
-    run.go(0.5)
-    assert run.motion.start_kick(KickGoal(side)) == ""
-    run.go(4.0)
-    assert run.motion.mode is MotionMode.STAND
-    assert run.fastest_ball > 2.0
-
-
-def test_a_kick_is_refused_with_a_reason_unless_the_robot_stands() -> None:
-    run = Run()
-    run.go(1.0, walk(0.1))
-    assert "mode WALK" in run.motion.start_kick(KickGoal(Side.LEFT))
-    standing = Run()
-    standing.go(0.1)
-    assert "speed" in standing.motion.start_kick(KickGoal(Side.LEFT, speed=9.0))
-    assert "direction" in standing.motion.start_kick(KickGoal(Side.LEFT, direction=2.0))
 
 
 def test_a_fall_ends_limp_and_says_why() -> None:

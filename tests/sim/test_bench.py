@@ -51,15 +51,26 @@ WALK_ROWS: list[Row] = [
 ]
 KICK_ROWS: list[Row] = [
     {
+        "kind": kind,
         "foot": "left",
-        "seed": 0,
-        "refusal": "",
+        "seed": seed,
+        "told": True,
+        "wanted direction [rad]": 0.0,
+        "wanted speed [m/s]": 3.2,
+        "refusal": refusal,
         "upright": upright,
         "ball speed [m/s]": speed,
-        "direction [deg]": direction,
+        "direction error [deg]": direction,
+        "greatest joint speed [rad/s]": 9.0,
+        "greatest torque by limit": 0.9,
         "greatest tilt [rad]": 0.1,
     }
-    for upright, speed, direction in ((True, 2.5, 3.0), (False, 2.5, -4.0), (True, 1.9, 0.0))
+    for kind, seed, refusal, upright, speed, direction in (
+        ("forward", 0, "", True, 3.5, 3.0),
+        ("forward", 1, "", False, 3.5, -4.0),
+        ("forward", 2, "", True, 2.9, 0.0),
+        ("walking", 3, "out of reach", True, 0.0, 90.0),
+    )
 ]
 
 
@@ -83,8 +94,21 @@ def test_walks_are_summarized_by_speed() -> None:
     ]
 
 
-def test_good_kicks_are_fast_and_leave_the_robot_upright() -> None:
-    assert "| 3, both feet | 1 of 3 | 1.9, 2.5 m/s | 2.9 deg | 0.10 rad |" in kick.summarize(KICK_ROWS)
+def test_good_kicks_are_carried_out_fast_and_leave_the_robot_upright() -> None:
+    lines = kick.summarize(KICK_ROWS)
+    assert (
+        "| forward | 3.2 m/s | 1 of 3 at 3.0 m/s or more | 2 of 3 | 2.90, 3.50 m/s | 2.9, -0.3 deg"
+        " | 9.0 rad/s | 0.90 | 0.10 rad |"
+    ) in lines
+    assert "- walking, left foot, seed 3: out of reach" in lines
+
+
+def test_where_the_balls_went_is_drawn(tmp_path: Path) -> None:
+    kick.draw(KICK_ROWS, tmp_path / "kick.png")
+    assert (tmp_path / "kick.png").read_bytes().startswith(b"\x89PNG")
+    save(kick.BENCH, KICK_ROWS, tmp_path)
+    write_results([kick.BENCH], tmp_path, tmp_path / "results.md")
+    assert f"![Kicking]({tmp_path.name}/kick.png)" in (tmp_path / "results.md").read_text()
 
 
 def _late(index: int) -> Row:
@@ -105,7 +129,7 @@ def test_rows_keep_the_order_of_the_trials_whichever_ends_first() -> None:
 def test_a_kick_is_measured_kept_and_published(tmp_path: Path) -> None:
     bench = replace(kick.BENCH, trials=kick.BENCH.trials[:1])
     rows = run(bench, workers=1)
-    assert [(row["foot"], row["seed"], row["refusal"]) for row in rows] == [("left", 0, "")]
+    assert [(row["kind"], row["foot"], row["refusal"]) for row in rows] == [("forward", "left", "")]
     kept = save(bench, rows, tmp_path / "results")
     assert kept == tmp_path / "results" / "kick.json"
     assert json.loads(kept.read_text()) == {"bench": "kick", "rows": rows}
@@ -113,7 +137,7 @@ def test_a_kick_is_measured_kept_and_published(tmp_path: Path) -> None:
     write_results(BENCHES, tmp_path / "results", page)
     text = page.read_text()
     assert "## Kicking (`kick`)" in text
-    assert "| 1, both feet | 1 of 1 |" in text
+    assert "| forward | 3.2 m/s | 1 of 1 at 3.0 m/s or more | 1 of 1 |" in text
     assert "## Walking" not in text  # nothing is known of it
 
 

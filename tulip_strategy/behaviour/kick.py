@@ -142,9 +142,14 @@ class Strike(Leaf):
     def update(self) -> Status:
         """Ask."""
         context, parameters = self.context, self.context.parameters
-        limit = parameters.kick_direction_limit
-        direction = max(-limit, min(limit, context.aim.direction))
-        ask_for_kick(context, KickGoal(self._foot.side, direction, parameters.kick_speed))
+        ball, limit = context.ball.position, parameters.kick_direction_limit
+        outward = 1.0 if self._foot.side is Side.LEFT else -1.0
+        room = limit
+        if ball is not None:
+            # The nearer the ball lies to the other foot, the less the run-up may come from there.
+            room += parameters.kick_outward_slope * (outward * ball[1] - parameters.kick_lateral)
+        direction = outward * max(-limit, min(limit, room, outward * context.aim.direction))
+        ask_for_kick(context, KickGoal(self._foot.side, direction, parameters.kick_speed, ball=ball))
         return Status.SUCCESS
 
 
