@@ -23,7 +23,7 @@ class Course:
         """Begin from rest."""
         self._parameters = parameters
         self._reach = reach
-        self._heading: float | None = None
+        self._planned: Pose2D | None = None
         self.velocity: Velocity = STILL
         self.step_time = parameters.step_time
         """Duration of the next step, double support included [s]."""
@@ -38,7 +38,7 @@ class Course:
             wish: What is commanded.
         """
         p = self._parameters
-        straight = self._straightened(stance)
+        straight = self._on_course(stance)
         wanted = self._velocity_to(wish, straight) if isinstance(wish, Pose2D) else wish or STILL
         possible, self.note = self._reach.limited(wanted)
         if isinstance(wish, Pose2D):
@@ -48,7 +48,7 @@ class Course:
         steps = plan_footsteps(straight, self.velocity, self.step_time, p.stance_width, PREVIEW_STEPS)
         if isinstance(wish, Pose2D) and self._is_near(wish, straight):
             steps = self._last_steps(wish, straight)
-        self._heading = steps[0].pose.yaw
+        self._planned = centre_beside(steps[0], p.stance_width)
         return steps
 
     def reached(self, wish: Wish, feet: tuple[Footstep, Footstep]) -> bool:
@@ -61,16 +61,23 @@ class Course:
             there = wish is None and self.velocity == STILL
         return there and is_at(left, right, p.closing_tolerance, p.closing_tolerance_yaw)
 
-    def _straightened(self, stance: Footstep) -> Footstep:
-        """Return the stance foot with the heading that it was meant to have.
+    def _on_course(self, stance: Footstep) -> Footstep:
+        """Return the stance foot with the heading, and on the line, that it was meant to have.
 
-        Feet land turned by some hundredths of a radian; planned from where they look, the robot would wander off.
+        Feet land turned by some hundredths of a radian and some millimetres aside; planned from where they look and
+        stand, the robot would wander off. A robot that was pushed far off its line takes a new one.
         """
-        pose, most = stance.pose, self._parameters.max_heading_correction
-        if self._heading is None:
+        p = self._parameters
+        if self._planned is None:
             return stance
-        correction = min(max(wrap_angle(self._heading - pose.yaw), -most), most)
-        return Footstep(stance.side, Pose2D(pose.x, pose.y, pose.yaw + correction))
+        centre = centre_beside(stance, p.stance_width)
+        off = self._planned.inverse() @ centre
+        most = p.max_heading_correction
+        turned = Pose2D(centre.x, centre.y, centre.yaw + min(max(-off.yaw, -most), most))
+        aside = min(max(-off.y, -p.max_course_correction), p.max_course_correction)
+        if abs(off.y) > p.course_give_way:
+            aside = 0.0
+        return foot_beside(turned @ Pose2D(0.0, aside, 0.0), stance.side, p.stance_width)
 
     def _smoothed(self, wanted: Velocity) -> Velocity:
         """Return the speed for the next step: not far from the present one."""

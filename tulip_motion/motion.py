@@ -120,6 +120,11 @@ class Motion:
         self._command = command
 
     @property
+    def stance(self) -> Side:
+        """The foot that all tasks are relative to."""
+        return self._reference.stance.side
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What somebody should know, in words: a command that was clipped, a posture that could not be reached."""
         if self._mode in (MotionMode.LIMP, MotionMode.FALLEN):

@@ -50,6 +50,8 @@ class MotionParameters:
     max_turn_rate: float = 1.3  # [rad/s]
     max_speed_change: float = 0.10  # [m/s] a step; larger jumps move the DCM reference too far
     max_turn_change: float = 0.4  # [rad/s] a step
+    max_course_correction: float = 0.02  # [m] sideways a step, back to the line of the walk
+    course_give_way: float = 0.15  # [m] beside its line a robot that was pushed takes a new one
     max_heading_correction: float = 0.2  # [rad] a step; a robot that was turned by force gives way
     closing_tolerance: float = 0.03  # [m] feet that stand side by side within this need no further step
     closing_tolerance_yaw: float = 0.1  # [rad]
@@ -57,7 +59,7 @@ class MotionParameters:
     goal_tolerance_yaw: float = 0.05  # [rad]
     goal_holonomic_distance: float = 0.5  # [m] nearer, the robot goes sideways rather than turn to its goal
     min_foot_distance: float = 0.165  # [m] sideways between the ankles; soles are 0.15 m wide
-    reach_share: float = 0.7  # of what straight legs and the hip yaw could reach; see reach.py
+    reach_share: float = 0.76  # of what straight legs and the hip yaw could reach; see reach.py
     contact_force: float = 40.0  # [N] on a sole means that it carries weight
     contact_phase: float = 0.6  # of the swing; earlier contacts are stubbed toes, not landings
     late_contact_time: float = 0.10  # [s] after the planned landing the step is taken as landed

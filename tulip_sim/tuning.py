@@ -60,7 +60,7 @@ SPACE: dict[str, tuple[float, float]] = {
 """Bounds of every parameter in gait.yaml."""
 
 WALKS = ("forward", "sideways", "backward", "turn", "start_stop", "push")
-PUSH = 8.0  # [N s] on the torso, within 0.1 s
+PUSH = 10.0  # [N s] on the torso, within 0.1 s
 PUSH_PERIOD = 2.0  # [s]
 LONGEST_PULSE = 2.0  # [s] of walking, then as long of standing, in "start_stop"
 PLENTY = 0.75  # share of a motor's limit that costs nothing

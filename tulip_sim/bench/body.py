@@ -32,6 +32,7 @@ class Body:
         self.motion = Motion(parameters or MotionParameters(), self.world.robot)
         self.greatest_tilt = 0.0  # [rad]
         self.greatest_efforts = np.zeros(14)  # [N m]
+        self.greatest_speeds = np.zeros(14)  # [rad/s]
         self.ball_speed = 0.0  # [m/s] greatest so far
         self.ball_direction = 0.0  # [rad] at that speed, in map
         self._pending: JointCommand | None = None
@@ -54,6 +55,7 @@ class Body:
         x, y = float(truth.base_orientation[0]), float(truth.base_orientation[1])
         self.greatest_tilt = max(self.greatest_tilt, math.acos(min(1.0, 1.0 - 2.0 * (x * x + y * y))))
         self.greatest_efforts = np.maximum(self.greatest_efforts, np.abs(sensors.joint_efforts))
+        self.greatest_speeds = np.maximum(self.greatest_speeds, np.abs(sensors.joint_velocities))
         speed = math.hypot(float(truth.ball_linear_velocity[0]), float(truth.ball_linear_velocity[1]))
         if speed > self.ball_speed:
             self.ball_speed = speed
