@@ -15,7 +15,6 @@ from tulip_description.robot import HEAD_JOINTS, LEG_JOINTS, Robot
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_motion.course import Wish, is_at, middle
 from tulip_motion.fall_detection import FallDetector
-from tulip_motion.feedforward import distance_share, feedforward
 from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import FootMotion, Reference, sole_point
 from tulip_motion.interface import (
@@ -30,11 +29,9 @@ from tulip_motion.interface import (
     WalkCommand,
     WalkMode,
 )
-from tulip_motion.inverse_kinematics import InverseKinematics, TaskTarget, orientation_error, rotation_z
-from tulip_motion.joint_control import JointGains, feedback
+from tulip_motion.inverse_kinematics import rotation_z
 from tulip_motion.kick import Kick, moved
 from tulip_motion.kick_plan import plan_kick, refused_numbers
-from tulip_motion.learning_file import LearningFile
 from tulip_motion.lipm import time_constant
 from tulip_motion.odometry import DeadReckoning, StanceTwist
 from tulip_motion.paper_gait import PaperGait
@@ -42,13 +39,11 @@ from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import reach
 from tulip_motion.stabilizer import Balance, stabilize
 from tulip_motion.state_estimator import Estimate, StateEstimator, planar_pose
-from tulip_motion.step_learning import StepLearner
+from tulip_motion.tracking import Order, StepInProgress, Tracking
 from tulip_motion.walking import Walking, must_step
 from tulip_motion.walking_kick import WalkingKick
 
 Array = NDArray[np.float64]
-
-HEIGHT_RATE = 0.1  # [m/s] the CoM is brought to its walking height without a jerk
 
 
 def with_fixed_head(robot: Robot) -> Robot:
@@ -65,14 +60,10 @@ class Motion:
         """Make motion control for a robot. It stands when the first sensors come in."""
         p = self._parameters = parameters
         # The head is light and near its axes: the legs are controlled as if it looked straight ahead.
-        self._model = floating_model(with_fixed_head(robot))
-        self._estimator = StateEstimator(p, self._model, np.array([foot.cells for foot in robot.feet]), np.eye(3))
-        self._kinematics = InverseKinematics(
-            self._model, p.clik_gain_position, p.clik_gain_orientation, p.clik_damping, robot.position_limits[:, :12]
-        )
-        self._gains = JointGains(p)
+        model = floating_model(with_fixed_head(robot))
+        self._estimator = StateEstimator(p, model, np.array([foot.cells for foot in robot.feet]), np.eye(3))
+        self._tracking = Tracking(p, model, robot)
         self._soles = robot.feet
-        self._effort_limits = robot.effort_limits[:12]
         self._reach = reach(p, robot)
         self._omega = 1.0 / time_constant(p.com_height)
         self._command = WalkCommand(0, WalkMode.STAND)
@@ -84,20 +75,10 @@ class Motion:
         self._started = False
         self._sequence = 0
         self._stamp = 0
-        self._acceleration = np.zeros(3)
-        self._height = 0.0
-        self._standing_on: Footstep | None = None
-        self._com_planned = np.zeros(2)
-        self._com_planned_velocity = np.zeros(2)
         self._left_weight = 0.5
         self._dead_reckoning = DeadReckoning(p)
         self._twist = StanceTwist(p.control_period)
         self._falls = FallDetector(p)
-        self._torques = np.zeros((3, 12))
-        self._learner: StepLearner | None = None
-        if p.learning != "none":
-            self._learner = StepLearner(p, self._effort_limits)
-            self._learning_file = LearningFile(p, robot, self._learner)
 
     @property
     def mode(self) -> MotionMode:
@@ -130,8 +111,7 @@ class Motion:
         if self._mode in (MotionMode.LIMP, MotionMode.FALLEN):
             return ()
         gait = self._gait.notes if isinstance(self._gait, Walking | PaperGait) else ()
-        learning = () if self._learner is None else (self._learner.note, self._learning_file.note)
-        return (*gait, *self._kinematics.notes, *(note for note in learning if note))
+        return (*gait, *self._tracking.notes)
 
     def start_kick(self, goal: KickGoal) -> str:
         """Begin a kick; return "" or the reason why not."""
@@ -184,19 +164,22 @@ class Motion:
     def tick(self, sensors: Sensors) -> JointCommand:
         """Return the command for the legs that answers one reading of the sensors."""
         self._stamp = sensors.stamp
-        estimate = self._estimate = self._estimator.update(sensors, self._left_weight, self._acceleration)
+        estimate = self._estimate = self._estimator.update(sensors, self._left_weight, self._tracking.com_acceleration)
         if not self._started:
             self._start(estimate)
         self._change_mode(estimate)
         if self._mode in (MotionMode.LIMP, MotionMode.FALLEN):
             if self._kick is not None:
                 self._kick.abandon(self._reason)
-            return self._limp(estimate)
+            return self._send(self._tracking.limp(estimate))
         reference = self._reference = self._advance_gait(estimate)
-        self._plan_com(reference)
         balance = self._balance = self._stabilize(estimate, reference)
         self._left_weight = 1.0 - balance.right_share
-        return self._track(estimate, reference, balance)
+        step = None
+        if isinstance(self._gait, Walking):
+            steady = self._command.mode is WalkMode.WALK
+            step = StepInProgress(self._gait.step_count, self._gait.course.velocity if steady else None)
+        return self._send(self._tracking.advance(estimate, reference, balance, step))
 
     def odometry(self) -> Odometry:
         """Return dead reckoning as of the last tick."""
@@ -217,7 +200,7 @@ class Motion:
 
     def state(self) -> MotionState:
         """Return the state of the legs as of the last tick."""
-        estimate, kinematics = self._estimate, self._kinematics
+        estimate, tracking = self._estimate, self._tracking
         dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
         walking = self._mode not in (MotionMode.LIMP, MotionMode.FALLEN)
         reference = self._reference if walking else None
@@ -229,29 +212,28 @@ class Motion:
             reference.phase if reference else 0.0,
             self._steps_before + (self._gait.step_count if isinstance(self._gait, Walking | PaperGait) else 0),
             estimate.com,
-            np.array([*self._com_planned, self._height]) if reference else np.full(3, np.nan),
+            tracking.com_planned if reference else np.full(3, np.nan),
             estimate.com_velocity,
-            np.array([*self._com_planned_velocity, 0.0]) if reference else np.full(3, np.nan),
+            tracking.com_velocity_planned if reference else np.full(3, np.nan),
             dcm,
             planned,
             estimate.zmp,
             np.array(self._balance.zmp) if reference else np.full(2, np.nan),
             estimate.soles,
             estimate.joint_positions,
-            kinematics.joint_positions.copy(),
+            tracking.joint_positions,
             estimate.joint_velocities,
-            kinematics.joint_velocities.copy(),
-            self._torques[0],
-            self._torques[1],
-            self._torques[2],
+            tracking.joint_velocities,
+            tracking.torques[0].copy(),
+            tracking.torques[1].copy(),
+            tracking.torques[2].copy(),
             reason=self._reason,
             notes=self.notes,
         )
 
     def save_learning(self) -> None:
         """Write what was learned since the last time to `learning_file`, if there is one."""
-        if self._learner is not None:
-            self._learning_file.save()
+        self._tracking.save_learning()
 
     def _base_footprint(self) -> Pose2D:
         """Return where base_footprint is in odom."""
@@ -269,10 +251,7 @@ class Motion:
 
     def _start(self, estimate: Estimate) -> None:
         """Begin to stand where the robot is."""
-        self._kinematics.reset(estimate.base_rotation, estimate.base_position, estimate.joint_positions)
-        self._height = float(estimate.com[2])
-        self._com_planned = estimate.com[:2].copy()
-        self._acceleration = np.zeros(3)
+        self._tracking.reset(estimate)
         self._left_weight = 0.5
         self._dead_reckoning.begin(self._stamp, estimate.base_position[:2])
         self._started = True
@@ -347,15 +326,15 @@ class Motion:
             reference = self._gait.tick(dt, self._wish(), (dcm[0], dcm[1]), landed, estimate.loads)
             self._gait.feet = self._twist.carried(before, self._gait.feet)
             self._anchor(self._gait.feet)
+            if reference.support is not Support.DOUBLE:
+                side = reference.stance.side
+                yaw = planar_pose(estimate.soles[side]).yaw
+                self._twist.update(self._estimator.anchors[side], yaw, estimate.zmp)
             return reference
         if isinstance(self._gait, PaperGait):
             landed = [planar_pose(sole) for sole in estimate.soles]
             reference = self._gait.tick(dt, self._wish(), (dcm[0], dcm[1]), landed, estimate.loads)
             self._anchor(self._gait.feet)
-            if reference.support is not Support.DOUBLE:
-                side = reference.stance.side
-                yaw = planar_pose(estimate.soles[side]).yaw
-                self._twist.update(self._estimator.anchors[side], yaw, estimate.zmp)
             return reference
         if isinstance(self._gait, Kick):
             landed = [planar_pose(sole) for sole in estimate.soles]
@@ -385,15 +364,6 @@ class Motion:
             for foot in feet:
                 self._estimator.anchor(foot)
 
-    def _plan_com(self, reference: Reference) -> None:
-        """Keep the CoM that belongs to the plan: given, or the one that its DCM leads, c' = (xi - c) / Tc."""
-        if reference.com is not None:
-            self._com_planned, self._com_planned_velocity = reference.com.position, reference.com.velocity
-            return
-        share = 1.0 - math.exp(-self._omega * self._parameters.control_period)
-        self._com_planned = self._com_planned + share * (reference.dcm - self._com_planned)
-        self._com_planned_velocity = self._omega * (reference.dcm - self._com_planned)
-
     def _stabilize(self, estimate: Estimate, reference: Reference) -> Balance:
         # In open loop nothing is corrected: the plan's own DCM leaves the plan's ZMP.
         measured = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
@@ -408,139 +378,8 @@ class Motion:
             self._parameters, reference.zmp, reference.dcm, (float(dcm[0]), float(dcm[1])), reference.stance, other
         )
 
-    def _track(self, estimate: Estimate, reference: Reference, balance: Balance) -> JointCommand:
-        """Turn the reference into joint angles, eq. (10), and torques, eqs. (12)-(15)."""
-        p, kinematics = self._parameters, self._kinematics
-        if self._learner is not None:
-            self._learn(self._learner, estimate, reference)  # before the desired angles move on
-        dt = p.control_period
-        climb = min(max(p.com_height - self._height, -HEIGHT_RATE * dt), HEIGHT_RATE * dt)
-        self._height += climb
-        rate = climb / dt
-        if reference.com is None:
-            com, velocity = estimate.com, estimate.com_velocity
-            self._standing_on = None
-        else:
-            com, velocity = reference.com.position, reference.com.velocity
-            self._stand_on(reference.stance)
-        com_target = np.array((com[0], com[1], self._height))
-        com_rate = np.array((velocity[0], velocity[1], rate))
-        torso = rotation_z(reference.torso_yaw)
-        torso_rate = np.array((0.0, 0.0, reference.torso_yaw_rate))
-        kinematics.update_jacobian(reference.stance.side)
-        kinematics.solve_velocity(TaskTarget(com_target, com_rate, torso, torso_rate, reference.other))
-
-        acceleration = self._task_acceleration(estimate, reference, balance, torso, rate)
-        self._acceleration = acceleration[:3].copy()
-        torques = self._feedforward(acceleration, reference, balance)
-        kinematics.integrate(dt, reference.stance.pose)
-        stiffness, damping = self._gains.of(reference.support, reference.com is not None)
-        positions, velocities = kinematics.joint_positions.copy(), kinematics.joint_velocities.copy()
-        self._torques[0] = feedback(
-            stiffness, damping, positions - estimate.joint_positions, velocities - estimate.joint_velocities
-        )
-        self._torques[1] = torques
-        return self._send(positions, velocities, torques + self._torques[2], stiffness, damping)
-
-    def _torso_acceleration(self, estimate: Estimate, torso: Array, reference: Reference) -> tuple[float, float, float]:
-        """Return the (3,) angular acceleration [rad/s^2], odom axes, that brings the torso to its attitude."""
-        p = self._parameters
-        ex, ey, ez = orientation_error(torso, estimate.base_rotation).tolist()
-        wx, wy, wz = estimate.angular_velocity.tolist()
-        stiffness, damping = p.torso_stiffness, p.torso_damping
-        turning = reference.torso_yaw_acceleration + damping * (reference.torso_yaw_rate - wz)
-        return stiffness * ex - damping * wx, stiffness * ey - damping * wy, stiffness * ez + turning
-
-    def _stand_on(self, stance: Footstep) -> None:
-        """Move the desired posture as a whole to a new stance foot, so that its joints take no notice of the change."""
-        if stance == self._standing_on:
-            return
-        self._standing_on = stance
-        kinematics = self._kinematics
-        q, data = kinematics.configuration, kinematics.data
-        pin.framesForwardKinematics(self._model, data, q)
-        sole = data.oMf[kinematics.sole_frames[stance.side]]
-        anchored = pin.SE3(rotation_z(stance.pose.yaw), np.array([stance.pose.x, stance.pose.y, 0.0]))
-        base = anchored * sole.inverse() * data.oMi[1]
-        q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
-
-    def _task_acceleration(
-        self, estimate: Estimate, reference: Reference, balance: Balance, torso: Array, height_rate: float
-    ) -> Array:
-        """Return (12,) of the CoM, the torso and the other foot: planned, or led by what is measured."""
-        p, foot, com = self._parameters, reference.other, reference.com
-        swing = (*foot.acceleration.tolist(), 0.0, 0.0, foot.yaw_acceleration)
-        if com is not None:
-            return np.array((*com.acceleration.tolist(), 0.0, 0.0, 0.0, 0.5 * foot.yaw_acceleration, *swing))
-        x, y, z = estimate.com.tolist()
-        return np.array(
-            (
-                self._omega**2 * (x - balance.zmp[0]),
-                self._omega**2 * (y - balance.zmp[1]),
-                p.height_stiffness * (self._height - z)
-                - p.height_damping * (float(estimate.com_velocity[2]) - height_rate),
-                *self._torso_acceleration(estimate, torso, reference),
-                *swing,
-            )
-        )
-
-    def _learn(self, learner: StepLearner, estimate: Estimate, reference: Reference) -> None:
-        """Set tau_ILC of eq. (12) from the errors of the desired angles that are in force now."""
-        if not isinstance(self._gait, Walking):
-            learner.rest()
-            self._torques[2] = 0.0
-            return
-        kinematics, gait = self._kinematics, self._gait
-        self._torques[2] = learner.tick(
-            reference.stance.side,
-            reference.support,
-            reference.phase,
-            gait.step_count,
-            gait.course.velocity if self._command.mode is WalkMode.WALK else None,
-            estimate.loads[reference.stance.side.other] > 0.25 * self._parameters.contact_force,
-            kinematics.joint_positions
-            - estimate.joint_positions
-            - self._parameters.learning_delay * estimate.joint_velocities,
-            kinematics.joint_velocities - estimate.joint_velocities,
-        )
-
-    def _feedforward(self, acceleration: Array, reference: Reference, balance: Balance) -> Array:
-        """Return (12,) tau_ff: eq. (14) in full, its term of gravity alone, or none."""
-        kinematics, kind = self._kinematics, self._parameters.feedforward
-        if kind == "none":
-            return np.zeros(12)
-        sharing = self._sharing(reference, balance)
-        if kind == "gravity":
-            return feedforward(kinematics, np.zeros(18), np.zeros(18), *sharing)
-        generalized = kinematics.solve_acceleration(acceleration)
-        return feedforward(kinematics, kinematics.velocity, generalized, *sharing)
-
-    def _sharing(self, reference: Reference, balance: Balance) -> tuple[float, tuple[Array, Array] | None]:
-        """Return alpha, and the aim points of the ZMP on the left and right foot in odom [m] or None, eq. (15)."""
-        p = self._parameters
-        if p.weight_sharing == "distance":
-            com = self._estimate.com if reference.com is None else reference.com.position
-            return distance_share(com, *self._kinematics.sole_positions), None
-        if balance.right_share in (0.0, 1.0):
-            return balance.right_share, None  # one foot takes all of it, wherever it does
-        foot = reference.other
-        other = Footstep(
-            reference.stance.side.other, Pose2D(float(foot.position[0]), float(foot.position[1]), foot.yaw)
-        )
-        points = [np.array((*sole_point(step, p.zmp_forward, p.zmp_inward), 0.0)) for step in (reference.stance, other)]
-        left, right = points if reference.stance.side is Side.LEFT else points[::-1]
-        return balance.right_share, (left, right)
-
-    def _limp(self, estimate: Estimate) -> JointCommand:
-        stiffness, damping = self._gains.limp
-        self._torques[:] = 0.0
-        if self._learner is not None:
-            self._learner.rest()
-        self._acceleration = np.zeros(3)
-        return self._send(estimate.joint_positions, np.zeros(12), np.zeros(12), stiffness, damping)
-
-    def _send(self, position: Array, velocity: Array, effort: Array, stiffness: Array, damping: Array) -> JointCommand:
+    def _send(self, order: Order) -> JointCommand:
         self._sequence += 1
-        # Two ufuncs: numpy's clip takes four times as long.
-        effort = np.minimum(np.maximum(effort, -self._effort_limits), self._effort_limits)
-        return JointCommand(self._sequence, self._stamp, LEG_JOINTS, position, velocity, effort, stiffness, damping)
+        return JointCommand(
+            self._sequence, self._stamp, LEG_JOINTS, order.position, order.velocity, order.effort, *order.gains
+        )

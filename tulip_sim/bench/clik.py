@@ -12,10 +12,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tulip_description.planar import Pose2D
-from tulip_motion import motion
+from tulip_motion import tracking
 from tulip_motion.inverse_kinematics import InverseKinematics
 from tulip_motion.motion import Motion
 from tulip_motion.state_estimator import StateEstimator
+from tulip_motion.tracking import Tracking
 from tulip_sim.bench import clik_solvers
 from tulip_sim.bench.body import Body
 from tulip_sim.bench.clik_reference import replaced, tracking_errors, walk_reference
@@ -34,7 +35,7 @@ PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
         (InverseKinematics, name) for name in ("update_jacobian", "solve_velocity", "integrate")
     ),
     "joint accelerations": ((InverseKinematics, "solve_acceleration"),),
-    "feedforward (15)": ((motion, "feedforward"), (Motion, "_sharing")),
+    "feedforward (15)": ((tracking, "feedforward"), (Tracking, "_sharing")),
 }
 """Functions whose time makes up each part of a tick; what is left is the rest."""
 
