@@ -20,10 +20,12 @@ from tulip_motion.kick_geometry import gap_between, striking_face
 from tulip_motion.kick_path import FootPath, Move, Profile, Quintic, brake
 from tulip_motion.kick_plan import plan_kick
 from tulip_motion.parameters import MotionParameters
+from tulip_motion.reach import reach, step_time
 from tulip_motion.walking_kick import KickSwing, WalkingKick
 
 P = MotionParameters()
 SOLES = load_robot().feet
+REACH = reach(P, load_robot())
 FEET = (Pose2D(0.067, 0.12, 0.0), Pose2D(0.067, -0.12, 0.0))
 numbers = st.floats(-1.0, 1.0)
 fours = st.tuples(numbers, numbers, numbers, numbers)
@@ -189,7 +191,7 @@ def test_what_cannot_be_kicked_is_refused_in_words(goal: KickGoal, words: str) -
 def test_a_kicking_swing_meets_the_ball_at_full_speed_and_lands_at_rest() -> None:
     contact = Pose2D(0.15, 0.12, 0.1)
     swing = KickSwing(Pose2D(-0.1, 0.12, 0.0), contact, 1.2, 0.236, 0.392, 0.045, 0.15)
-    feet = [swing.advance(Pose2D(0.24, 0.13, 0.05), 0.004) for _ in range(98)]
+    feet = [swing.advance(Pose2D(0.24, 0.13, 0.05), 0.392 - 0.004 * k, 0.004) for k in range(98)]
     met = feet[58]
     np.testing.assert_allclose(met.position[:2], [contact.x, contact.y], atol=1e-4)
     np.testing.assert_allclose(met.velocity[:2], [1.2 * math.cos(0.1), 1.2 * math.sin(0.1)], atol=1e-2)
@@ -204,24 +206,24 @@ def test_a_kicking_swing_that_is_given_up_lands_where_it_was_to_land() -> None:
     for k in range(98):
         if k == 30:
             swing.give_up()
-        foot = swing.advance(Pose2D(0.24, 0.13, 0.05), 0.004)
+        foot = swing.advance(Pose2D(0.24, 0.13, 0.05), 0.392 - 0.004 * k, 0.004)
     np.testing.assert_allclose(foot.position, [0.24, 0.13, 0.0], atol=2e-3)
 
 
 @given(st.floats(0.1, 0.45), st.floats(0.6, 1.0), st.sampled_from(Side))
 def test_a_ball_ahead_of_the_foot_is_reached_by_one_of_the_next_steps(speed: float, ahead: float, side: Side) -> None:
     outward = 1.0 if side is Side.LEFT else -1.0
-    kick = WalkingKick(P, side, (ahead, outward * 0.12), 0.0, 1.2, SOLES)
+    kick = WalkingKick(P, REACH, side, (ahead, outward * 0.12), 0.0, 1.2, SOLES)
     stance = Footstep(Side.LEFT, Pose2D(0.067, 0.12, 0.0))
-    refusal = kick.refusal(stance, Pose2D(0.067 - speed * P.step_time, -0.12, 0.0), (speed, 0.0, 0.0))
+    refusal = kick.refusal(stance, Pose2D(0.067 - speed * step_time(P, speed), -0.12, 0.0), (speed, 0.0, 0.0))
     # The last two steps may be the other foot's, and end before it.
-    far = ahead - 0.5 > speed * P.step_time * (P.walking_kick_steps - 2)
+    far = ahead - 0.5 > speed * step_time(P, speed) * (P.walking_kick_steps - 2)
     assert far or not refusal
 
 
 def test_a_ball_beside_the_way_is_refused_with_the_place_of_the_foot() -> None:
-    kick = WalkingKick(P, Side.LEFT, (0.7, 0.6), 0.0, 1.2, SOLES)
+    kick = WalkingKick(P, REACH, Side.LEFT, (0.7, 0.6), 0.0, 1.2, SOLES)
     stance = Footstep(Side.LEFT, Pose2D(0.067, 0.12, 0.0))
     refusal = kick.refusal(stance, Pose2D(0.0, -0.12, 0.0), (0.25, 0.0, 0.0))
     assert "no left step of the next 8 reaches the ball" in refusal
-    assert "0.72) m from the standing one" in refusal
+    assert "0.75) m from the standing one" in refusal
