@@ -138,6 +138,8 @@ class MotionParameters:
     zmp_limit_toe: float = 0.09  # [m] ahead of the aim point
     zmp_limit_side: float = _tuned("zmp_limit_side")  # [m] either side of the aim point
     observer_position_gain: float = _tuned("observer_position_gain")  # [1/s]
+    imu_bias_time: float = 2.0  # [s] of single support, after which 63 % of the IMU's tilt error is known
+    imu_bias_limit: float = 0.01  # [rad] more is no mounting error but ground that is not level
     observer_velocity_gain: float = _tuned("observer_velocity_gain")  # [1/s]
     height_stiffness: float = _tuned("height_stiffness")  # [1/s^2]
     height_damping: float = _tuned("height_damping")  # [1/s]

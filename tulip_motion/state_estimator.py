@@ -84,6 +84,7 @@ class StateEstimator:
         self._base_rotation = data.oMi[1].rotation
         self._sole_positions = tuple(data.oMf[i].translation for i in self._soles)
         self._heading_offset: float | None = None
+        self._tilt_bias = (0.0, 0.0)  # [rad] of the IMU about the x and y axis of base_link
         self._com: list[float] | None = None
         self._com_velocity = [0.0, 0.0, 0.0]
         self.anchors: list[Pose2D] = [Pose2D(), Pose2D()]
@@ -123,9 +124,11 @@ class StateEstimator:
             px, py, pz = place.tolist()
             sole[:3, 3] = (px + x, py + y, pz + z)
         rotation = self._base_rotation.copy()
-        com, com_velocity = self._observe(position, velocity, acceleration)
         cells = sensors.foot_cells
         loads = (sum(cells[0].tolist()), sum(cells[1].tolist()))
+        if left_weight in (0.0, 1.0):
+            self._learn_tilt_bias(soles[Side.LEFT if left_weight == 1.0 else Side.RIGHT], rotation)
+        com, com_velocity = self._observe(position, velocity, acceleration)
         return Estimate(
             np.array(position),
             rotation,
@@ -147,7 +150,24 @@ class StateEstimator:
         if self._heading_offset is None:
             self._heading_offset = -quaternion_yaw(attitude)
         half = 0.5 * self._heading_offset
-        return quaternion_product((0.0, 0.0, math.sin(half), math.cos(half)), attitude)
+        turned = quaternion_product((0.0, 0.0, math.sin(half), math.cos(half)), attitude)
+        x, y = self._tilt_bias
+        return quaternion_product(turned, (-0.5 * x, -0.5 * y, 0.0, math.sqrt(1.0 - 0.25 * (x * x + y * y))))
+
+    def _learn_tilt_bias(self, sole: Array, rotation: Array) -> None:
+        """Take part of the tilt that a foot alone on level ground seems to have for the IMU's own.
+
+        A mounting error of some milliradians would lean the torso, and ask the ankles for angles that the ground does
+        not allow: no torque could then bring the joint error down.
+        """
+        p = self._parameters
+        share, most = p.control_period / p.imu_bias_time, p.imu_bias_limit
+        about_x, about_y = -float(sole[1, 2]), float(sole[0, 2])
+        c, s = float(rotation[0, 0]), float(rotation[1, 0])
+        x, y = self._tilt_bias
+        x += share * (c * about_x + s * about_y)
+        y += share * (c * about_y - s * about_x)
+        self._tilt_bias = (min(max(x, -most), most), min(max(y, -most), most))
 
     def _from_feet(self, left_weight: float) -> tuple[Point, Point]:
         """Return position [m] and velocity [m/s] of the base that leave the feet that carry where they stand."""

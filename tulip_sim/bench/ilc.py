@@ -24,7 +24,6 @@ STANDARD = WorldParameters()
 ROBOTS = {
     "nominal": STANDARD,
     "heavier, with friction": replace(STANDARD, mass_scale=1.1, joint_friction=(0.02, 0.04)),
-    "nominal, IMU mounted exactly": replace(STANDARD, sensors=replace(STANDARD.sensors, attitude_bias=0.0)),
 }
 LAWS = ("none", "adaptive", "waveform")
 SEEDS = (1, 2, 3)
