@@ -17,7 +17,7 @@ STILL: Velocity = (0.0, 0.0, 0.0)
 
 
 class Course:
-    """Plans the next footsteps at the begin of each step."""
+    """Plans the next footsteps when a step begins."""
 
     def __init__(self, parameters: MotionParameters, reach: Reach) -> None:
         """Begin from rest."""
@@ -25,6 +25,7 @@ class Course:
         self._reach = reach
         self._planned: Pose2D | None = None
         self.velocity: Velocity = STILL
+        """Of the step that was planned last: what all limits have left of the command."""
         self.step_time = parameters.step_time
         """Duration of the next step, double support included [s]."""
         self.note = ""
@@ -94,7 +95,8 @@ class Course:
         way = centre_beside(stance, p.stance_width).inverse() @ goal
         distance = math.hypot(way.x, way.y)
         turn = math.atan2(way.y, way.x) if distance > p.goal_holonomic_distance else way.yaw
-        # From this speed the robot comes to rest on the way that is left, slowing down by the permitted change a step.
+        # From this speed the robot comes to rest on the way that is left, slowing down by the permitted change a step;
+        # 0.7 leaves room, since it can slow down only once a step.
         brake = math.sqrt(2.0 * p.max_speed_change / self.step_time * distance) * 0.7
         fastest = min(limits.forward, brake)
         if distance > p.goal_holonomic_distance:
@@ -108,6 +110,7 @@ class Course:
         to_goal = centre_beside(stance, p.stance_width).inverse() @ goal
         foot = stance.pose.inverse() @ foot_beside(goal, stance.side.other, p.stance_width).pose
         outward = abs(foot.y)
+        # The last line: the foot's place lies on its own side of the stance foot, so that the legs do not cross.
         return (
             abs(to_goal.x) <= (abs(self.velocity[0]) + p.max_speed_change) * self.step_time
             and abs(to_goal.y) <= 2.0 * (abs(self.velocity[1]) + p.max_speed_change) * self.step_time
@@ -117,7 +120,7 @@ class Course:
         )
 
     def _last_steps(self, goal: Pose2D, stance: Footstep) -> list[Footstep]:
-        """Return the steps that put both feet on the goal."""
+        """Return the steps that put both feet on the goal, and then two in place there to fill the plan."""
         first, second = (
             foot_beside(goal, side, self._parameters.stance_width) for side in (stance.side.other, stance.side)
         )

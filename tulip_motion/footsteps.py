@@ -17,12 +17,12 @@ class Footstep:
 
 
 def centre_beside(foot: Footstep, stance_width: float) -> Pose2D:
-    """Return the point midway between the feet when the other foot stands `stance_width` [m] beside this one."""
+    """Return the pose midway between the feet when the other foot stands `stance_width` [m] beside this one."""
     return foot.pose @ Pose2D(0.0, -0.5 * stance_width if foot.side is Side.LEFT else 0.5 * stance_width)
 
 
 def foot_beside(centre: Pose2D, side: Side, stance_width: float) -> Footstep:
-    """Return the foot of a side for a body centre; inverse of `centre_beside`."""
+    """Return the foot of a side when the middle between the feet is at `centre`; inverse of `centre_beside`."""
     return Footstep(side, centre @ Pose2D(0.0, 0.5 * stance_width if side is Side.LEFT else -0.5 * stance_width))
 
 

@@ -77,7 +77,7 @@ class HeadMovement:
         self._fastest = np.array([joint.velocity for joint in joints])
         pan, tilt = joints
         self._neck = np.array([pan.origin[0], pan.origin[1], pan.origin[2] + standing_posture(robot).base_height])
-        self._tilt_axis = np.array(tilt.origin)  # in the neck, straight above the pan axis' plane y = 0
+        self._tilt_axis = np.array(tilt.origin)  # in the neck's frame; it crosses the pan axis (y = 0)
         self._camera = np.array(robot.camera.origin)  # in the head
         self._stamp: int | None = None
         self._sequence = 0

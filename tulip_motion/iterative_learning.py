@@ -2,7 +2,8 @@
 
 Left and right steps are mirrored repetitions of one motion. A law therefore works on a step seen from its stance leg:
 the six joints of the stance leg first, then those of the swing leg, with the yaw and roll of a right-footed step turned
-round. A memory holds what was learned at N nodes of the step's phase.
+round. A memory holds what was learned at N nodes of the step's phase. Steps of about the same velocity share one
+memory; each such class of steps is called a situation (step_learning.py).
 """
 
 from __future__ import annotations

@@ -58,7 +58,14 @@ def quintic(time: float, duration: float) -> tuple[float, float, float]:
 def hermite(
     time: float, duration: float, start: tuple[float, float, float], end: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """Return position, velocity and acceleration on the quintic between two of such states."""
+    """Return position, velocity and acceleration at a time on the quintic that leads from one such triple to another.
+
+    Args:
+        time: From 0 to `duration` [s].
+        duration: [s].
+        start: Position, velocity and acceleration at time 0.
+        end: The same at `duration`.
+    """
     (p0, v0, a0), (p1, v1, a1), s = start, end, time / duration
     v0, v1, a0, a1 = v0 * duration, v1 * duration, a0 * duration**2, a1 * duration**2
     way, turn = p1 - p0 - v0 - 0.5 * a0, v1 - v0 - a0

@@ -30,6 +30,7 @@ from tulip_motion.reach import Velocity
 
 AXES = ("speed forward", "speed sideways", "turning rate")
 UNITS = ("m/s", "m/s", "rad/s")
+"""The components of a velocity, in the words of notes."""
 
 
 class Rocking:

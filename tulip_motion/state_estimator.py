@@ -59,7 +59,7 @@ class Estimate:
 
 
 class StateEstimator:
-    """Keeps the anchors of the feet and the observer of the CoM."""
+    """Says where the body is, from where the soles stand and what IMU and joints say."""
 
     def __init__(self, parameters: MotionParameters, model: Any, cell_positions: Array, imu_rotation: Array) -> None:
         """Make an estimator.
@@ -88,6 +88,7 @@ class StateEstimator:
         self._com: list[float] | None = None
         self._com_velocity = [0.0, 0.0, 0.0]
         self.anchors: list[Pose2D] = [Pose2D(), Pose2D()]
+        """Where the left and the right sole stand, or were put down last, in odom."""
 
     def anchor(self, foot: Footstep) -> None:
         """Take a foot to be fixed on the ground at its pose from now on."""

@@ -63,7 +63,7 @@ class WalkingKick:
         )
         swing = p.walking_kick_step_time - p.double_support_time
         self._contact_time = p.walking_kick_contact * swing
-        # At rest where it comes to with the mean of full speed and none.
+        # The foot lands where it would come to if it slowed down evenly from the contact to the end of the swing.
         way = 0.5 * self._foot_speed * (swing - self._contact_time)
         self._landing = self._contact @ Pose2D(way, 0.0, 0.0)
         self._steps_left = p.walking_kick_steps

@@ -172,7 +172,7 @@ ROBOT_POSE = Topic(
 TF = Topic("tf", TFMessage, EVENTS, ("worldmodel", "motion"), (), "map to odom; odom to base_footprint to base_link")
 GAME_STATE = Topic("game_state", GameState, LATCHED, ("game_input",), ("strategy",), "the referee's view of the game")
 USER_COMMAND = Topic("user_command", UserCommand, LATCHED, ("user_input",), ("strategy",), "the user's last wish")
-WALK_COMMAND = Topic("walk_command", WalkCommand, CONTROL, ("strategy",), ("motion",), "velocity for the legs")
+WALK_COMMAND = Topic("walk_command", WalkCommand, CONTROL, ("strategy",), ("motion",), "velocity or goal for the legs")
 HEAD_COMMAND = Topic("head_command", HeadCommand, CONTROL, ("strategy",), ("head",), "what the head shall look at")
 DECISION = Topic("decision", Decision, STATE, ("strategy",), (), "what strategy decided and why (behaviour tree)")
 ROBOT_DESCRIPTION = Topic("robot_description", String, LATCHED, ("driver",), (), "URDF of the robot, for viewers")
@@ -219,7 +219,7 @@ STAND = Service("stand", Trigger, "user_input", "stand up straight")
 GO_LIMP = Service("limp", Trigger, "user_input", "legs without stiffness")
 START_RECORDING = Service("start_recording", StartRecording, "recorder", "begin a recording")
 STOP_RECORDING = Service("stop_recording", StopRecording, "recorder", "end the recording")
-KICK = Service("kick", Kick, "motion", "action: kick once with one foot")
+KICK = Service("kick", Kick, "motion", "action: kick the ball once, from standing or by a step of the walk")
 
 SERVICES: tuple[Service, ...] = (
     RESET,
