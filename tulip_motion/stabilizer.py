@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from tulip_motion.footsteps import Footstep
@@ -70,8 +71,8 @@ def nearest_in_support(
         share = min(max(share, 0.0), 1.0)
         aim = (aim[0] + share * dx, aim[1] + share * dy)
     # Both soles are the same rectangle, so their hull is that rectangle moved along the line between them.
-    forward, left = stance.pose.rotation().T @ (point[0] - aim[0], point[1] - aim[1])
-    forward = min(max(forward, -p.zmp_limit_heel), p.zmp_limit_toe)
-    left = min(max(left, -p.zmp_limit_side), p.zmp_limit_side)
-    dx, dy = stance.pose.rotation() @ (forward, left)
-    return (float(aim[0] + dx), float(aim[1] + dy)), share
+    c, s = math.cos(stance.pose.yaw), math.sin(stance.pose.yaw)
+    dx, dy = point[0] - aim[0], point[1] - aim[1]
+    forward = min(max(c * dx + s * dy, -p.zmp_limit_heel), p.zmp_limit_toe)
+    left = min(max(c * dy - s * dx, -p.zmp_limit_side), p.zmp_limit_side)
+    return (aim[0] + c * forward - s * left, aim[1] + s * forward + c * left), share

@@ -12,13 +12,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import Reach
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 
@@ -50,14 +46,14 @@ class StepAdjustment:
         """
         p = self._parameters = parameters
         self._time_constant = time_constant
+        self._inward = inward
         near, far = inward * reach.nearest, inward * reach.farthest
-        self._lowest = np.array([[-reach.stride], [min(near, far)]])
-        self._highest = np.array([[reach.stride], [max(near, far)]])
-        self._ankle_lowest = np.array([[-p.zmp_limit_heel], [-p.zmp_limit_side]])
-        self._ankle_highest = np.array([[p.zmp_limit_toe], [p.zmp_limit_side]])
+        self._lowest = (-reach.stride, min(near, far))
+        self._highest = (reach.stride, max(near, far))
+        self._ankle_lowest = (-p.zmp_limit_heel, -p.zmp_limit_side)
+        self._ankle_highest = (p.zmp_limit_toe, p.zmp_limit_side)
         shift = p.double_support_time / time_constant
         # A ZMP that moves over during the double support, instead of at once, lets the error grow further.
-        self._inward = inward
         self._placement = p.placement_gain * shift / (1.0 - math.exp(-shift))
 
     def solve(
@@ -82,41 +78,38 @@ class StepAdjustment:
             fixed_time: Keep the planned time.
         """
         p = self._parameters
-        now = np.array([[dcm[0]], [dcm[1]]])
-        then = np.array([[planned_at_landing[0]], [planned_at_landing[1]]])
-        place = np.array([[nominal[0]], [nominal[1]]])
-        times = np.array([remaining])
-        cost, places, excess = self._cost(now, then, place, times, remaining)
+        best, rest = self._landing(dcm, planned_at_landing, nominal, remaining)
         # What place and ankles can do at the planned time needs no other time.
-        if excess[0] > 0.0 and not fixed_time:
-            times = np.arange(
-                p.placement_freeze_time, max(latest, p.placement_freeze_time) + 1e-9, 2.0 * p.control_period
-            )
-            cost, places, excess = self._cost(now, then, place, times, remaining)
-            way = np.hypot(places[0] - foot[0], places[1] - foot[1])
+        if best.excess == 0.0 or fixed_time:
+            return best
+        least = math.inf
+        count = max(round((latest - p.placement_freeze_time) / (2.0 * p.control_period)), 0) + 1
+        for k in range(count):
+            time = p.placement_freeze_time + 2.0 * k * p.control_period
+            landing, rest = self._landing(dcm, planned_at_landing, nominal, time)
+            x, y = landing.place
+            outer = max(self._inward * rest[1], 0.0)  # beyond the foot that lands, away from the stance foot
             # A move of minimum jerk is 1.9 times as fast in its middle as on average.
-            cost = cost + np.maximum(1.9 * way - p.max_swing_speed * times, 0.0)
-        best = int(np.argmin(cost))
-        return Landing(float(times[best]), (float(places[0, best]), float(places[1, best])), float(excess[best]))
+            too_far = max(1.9 * math.hypot(x - foot[0], y - foot[1]) - p.max_swing_speed * time, 0.0)
+            cost = (
+                landing.excess**2
+                + (p.outer_excess_weight - 1.0) * outer**2
+                + p.step_time_weight * (time - remaining) ** 2
+                + p.step_place_weight * ((x - nominal[0]) ** 2 + (y - nominal[1]) ** 2)
+                + too_far
+            )
+            if cost < least:
+                least, best = cost, landing
+        return best
 
-    def _cost(
-        self, now: Array, then: Array, nominal: Array, times: Array, remaining: float
-    ) -> tuple[Array, Array, Array]:
-        """Return cost, best place (2, n) [m] and excess [m] of each time until landing (n,)."""
-        p = self._parameters
-        growth = np.exp(times / self._time_constant)
-        error = now * growth - then  # of the DCM at landing, if nothing is done
-        place = np.minimum(np.maximum(nominal + self._placement * error, self._lowest), self._highest)
-        ankle = p.ankle_share * (growth - 1.0)  # a ZMP moved by 1 m until then moves the DCM by growth - 1
-        rest = error - (place - nominal)
-        rest = rest - np.minimum(np.maximum(rest, self._ankle_lowest * ankle), self._ankle_highest * ankle)
-        excess = np.hypot(rest[0], rest[1])
-        outer = np.maximum(self._inward * rest[1], 0.0)  # beyond the foot that lands, away from the stance foot
-        moved = place - nominal
-        cost = (
-            excess**2
-            + (p.outer_excess_weight - 1.0) * outer**2
-            + p.step_time_weight * (times - remaining) ** 2
-            + p.step_place_weight * (moved**2).sum(axis=0)
-        )
-        return cost, place, excess
+    def _landing(self, dcm: Point, planned: Point, nominal: Point, remaining: float) -> tuple[Landing, Point]:
+        """Return the best landing at a time, and the DCM error [m] that is left. Plain numbers: arrays take longer."""
+        growth = math.exp(remaining / self._time_constant)
+        ankle = self._parameters.ankle_share * (growth - 1.0)  # a ZMP moved by 1 m moves the DCM by growth - 1
+        place, rest = [0.0, 0.0], [0.0, 0.0]
+        for i in (0, 1):
+            error = dcm[i] * growth - planned[i]  # of the DCM at landing, if nothing is done
+            place[i] = min(max(nominal[i] + self._placement * error, self._lowest[i]), self._highest[i])
+            left = error - (place[i] - nominal[i])
+            rest[i] = left - min(max(left, self._ankle_lowest[i] * ankle), self._ankle_highest[i] * ankle)
+        return Landing(remaining, (place[0], place[1]), math.hypot(rest[0], rest[1])), (rest[0], rest[1])
