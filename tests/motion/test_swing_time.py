@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -48,7 +50,7 @@ def test_position_and_velocity_are_continuous_and_belong_together(
     changes: list[tuple[float, float, float, float]],
 ) -> None:
     motions, _ = swing(changes)
-    for before, after in zip(motions, motions[1:], strict=False):
+    for before, after in itertools.pairwise(motions):
         # Within a tick the jerk is constant: position and velocity are those of the integral of the acceleration.
         jerk = (after.acceleration - before.acceleration) / DT
         velocity = before.velocity + DT * before.acceleration + DT**2 / 2.0 * jerk
