@@ -110,6 +110,19 @@ class MinimumJerk:
         self.velocity += dt * (self.acceleration + dt * jerk / 2.0)
         self.acceleration += dt * jerk
 
+    def overshoots_zero(self, duration: float) -> bool:
+        """Return whether the quintic from here to rest at 0 in a time [s] passes through 0 before it arrives.
+
+        With s = t / T it is (1 - s)^3 (x + (3 x + v T) s + (6 x + 3 v T + a T^2 / 2) s^2).
+        """
+        x, way = self.position, self.velocity * duration
+        linear, square = 3.0 * x + way, 6.0 * x + 3.0 * way + 0.5 * self.acceleration * duration**2
+        lowest = min(max(-0.5 * linear / square, 0.0), 1.0) if square > 0.0 else 1.0
+        return x + (linear + square * lowest) * lowest < 0.0
+
+
+SHORTEST_DESCENT = 0.04  # [s] shorter, what is left of a millimetre would ask for endless jerk
+
 
 class SwingFoot:
     """Path of the swing foot from where it stood to a landing whose place and time may still move."""
@@ -126,6 +139,7 @@ class SwingFoot:
         self._axes = (MinimumJerk(start.x), MinimumJerk(start.y), MinimumJerk(start.yaw))
         self._vertical = MinimumJerk(0.0)
         self._rise_time = 0.5 * duration
+        self._rises = True
         self._height = height
         self._landing_speed = landing_speed
         self._time = 0.0
@@ -143,13 +157,19 @@ class SwingFoot:
         yaw.advance(yaw.position + wrap_angle(target.yaw - yaw.position), remaining, dt)
         z = self._vertical
         rising = self._rise_time - self._time
+        # A landing that was brought forward ends the rise, for good: coming down takes as long as going up.
+        self._rises = self._rises and rising > dt and remaining > self._rise_time
         if remaining <= dt:
             z.position -= self._landing_speed * dt
             z.velocity, z.acceleration = -self._landing_speed, 0.0
-        elif dt < rising < remaining:
+        elif self._rises:
             z.advance(self._height, rising, dt)
         else:
-            z.advance(0.0, remaining, dt)
+            # When the landing is put off on the way down, a path that slow would first dip into the ground.
+            down = remaining
+            while down > SHORTEST_DESCENT and z.overshoots_zero(down):
+                down -= dt
+            z.advance(0.0, down, dt)
         self._time += dt
         return FootMotion(
             np.array([x.position, y.position, z.position]),

@@ -156,7 +156,7 @@ class WaveformLaw:
         self._bound = p.learning_bound * effort_limits
         self._gain = p.learning_gain
         self._share = p.learning_mirror_share
-        self._lead = p.learning_lead / p.step_time
+        self._lead = p.learning_lead / p.control_period  # [ticks]
         self._margin, self._smooth = smoother(self._nodes, p.learning_smoothing / p.control_period)
 
     def playable(self, memory: Array, side: Side) -> Array:
@@ -171,7 +171,8 @@ class WaveformLaw:
         self, memory: Array, side: Side, phases: Array, rates: Array, feedback: Array, neighbour: Array | None
     ) -> None:
         """Add a share of the feedback torque, and smooth."""
-        needed = self._gain * on_nodes(phases, feedback, self._nodes, self._lead)
+        lead = self._lead * float(np.median(np.diff(phases)))  # longer steps pass through their phase more slowly
+        needed = self._gain * on_nodes(phases, feedback, self._nodes, lead)
         if side is Side.RIGHT:
             needed = mirrored(needed)
         for taught, share in ((side, 1.0), (side.other, self._share)):

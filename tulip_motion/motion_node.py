@@ -72,7 +72,7 @@ class MotionNode(ComponentNode):
             self._kick = None
 
     def _begin(self) -> None:
-        self._notes: tuple[str, ...] = ()
+        self._notes: set[str] = set()  # kinds of notes in the last report
         self._motion = Motion(self._settings, load_robot())
         self._sensors = SameStamp("joint_states", "imu", "foot_forces")
         self._tick = 0
@@ -106,9 +106,10 @@ class MotionNode(ComponentNode):
         self._odometry.publish(odometry_to_message(odometry))
         self._tf.publish(body_transforms(odometry))
         self._state.publish(motion_state_to_message(state, odometry.distance))
-        for note in set(state.notes) - set(self._notes):
-            self.health.count("notes", note)
-        self._notes = state.notes
+        notes = {note.partition(":")[0]: note for note in state.notes}
+        for kind in notes.keys() - self._notes:
+            self.health.count(kind, notes[kind])  # "walk command clipped", once for as long as it lasts
+        self._notes = set(notes)
         if state.mode is MotionMode.STAND:
             self._motion.save_learning()
         progress = self._motion.kick_progress

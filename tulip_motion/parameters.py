@@ -43,7 +43,7 @@ class MotionParameters:
     landing_speed: float = _tuned("landing_speed")  # [m/s] the foot goes on down when the ground comes late
     zmp_forward: float = _tuned("zmp_forward")  # [m] aim point of the ZMP ahead of the ankle: the middle of the sole
     zmp_inward: float = _tuned("zmp_inward")  # [m] aim point towards the other foot
-    # Speeds that were walked without a fall; the reach of a step limits them as well
+    # Speeds that were walked without a fall or a sliding foot at friction 0.65; the reach of a step limits them as well
     max_speed_forward: float = 0.65  # [m/s]
     max_speed_backward: float = 0.35  # [m/s]
     max_speed_sideways: float = 0.3  # [m/s]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
+from tulip_motion.parameters import MotionParameters
+
 _SIGNED = frozenset({"ready_x", "ready_y", "ready_yaw", "dribble_lateral"})
 
 
@@ -24,7 +26,7 @@ class StrategyParameters:
     heading_gain: float = 1.2  # [1/s] turning rate per heading error
 
     # Way round the ball.
-    ball_clearance: float = 0.50  # [m] reach of a toe's corner (0.29) + ball (0.094) + error of the ball's place
+    ball_clearance: float = 0.50  # [m] reach of a toe's corner (0.30) + ball (0.094) + error of the ball's place
     standoff: float = 0.58  # [m] behind the ball, where the approach ends: just outside the clearance
     arc_ahead: float = 0.6  # [rad] how far ahead on the circle round the ball the robot aims
     face_travel_distance: float = 0.8  # [m] with more left to go it faces its way, since forward is the fastest
@@ -52,7 +54,7 @@ class StrategyParameters:
 
     # Kicking.
     kick_ahead: float = 0.34  # [m] ball's centre at the kick: toe (0.217) + ball (0.094) + 30 mm not to touch it
-    kick_lateral: float = 0.12  # [m] of the kicking foot's middle, half the stance width
+    kick_lateral: float = 0.5 * MotionParameters.stance_width  # [m] of the kicking foot's middle as the robot stands
     kick_ahead_window: float = 0.03  # [m] aligned within this, stepping
     kick_lateral_window: float = 0.03  # [m]
     kick_heading_window: float = 0.15  # [rad] the foot's direction makes up for the rest

@@ -9,11 +9,13 @@ import pytest
 
 from tulip_description.planar import Pose2D
 from tulip_motion.interface import KickGoal, MotionMode, Side, WalkCommand, WalkMode
+from tulip_motion.parameters import MotionParameters
 from tulip_sim.bench.body import Body
 
 pytestmark = pytest.mark.sim
 START = Pose2D(0.0, 40.0, 0.4)
 STAND = WalkCommand(0, WalkMode.STAND)
+BEFORE_TOE = 0.217 + 0.095 + 0.03  # [m] a ball's centre ahead of base_footprint: toe, radius, and what is free between
 
 
 def tilt_of(body: Body) -> float:
@@ -68,7 +70,8 @@ def test_after_a_fall_and_the_referees_hands_the_robot_stands_and_walks_again(se
 @pytest.mark.parametrize("seed", range(3))
 def test_no_false_alarm_in_survived_pushes_fast_walking_and_kicks(seed: int) -> None:
     rng = np.random.default_rng([seed, 2])
-    body = Body(seed, Pose2D(0.0, 40.0, 0.0), ball=(0.21, 40.12) if seed == 0 else (0.0, 0.0))
+    ball = (BEFORE_TOE, 40.0 + 0.5 * MotionParameters().stance_width) if seed == 0 else (0.0, 0.0)
+    body = Body(seed, Pose2D(0.0, 40.0, 0.0), ball)
     body.go(0.5)
     if seed == 0:
         assert body.motion.start_kick(KickGoal(Side.LEFT, speed=3.0)) == ""

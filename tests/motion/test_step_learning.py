@@ -111,6 +111,18 @@ def test_what_a_step_did_not_reach_teaches_nothing() -> None:
     assert found[:69].all() and not found[71:].any()
 
 
+@pytest.mark.parametrize("ticks", [90, 112])  # a step in place, and one at 0.4 m/s
+def test_the_lead_is_the_same_time_in_short_and_long_steps(ticks: int) -> None:
+    law = WaveformLaw(replace(WAVEFORM, learning_smoothing=0.0, learning_gain=1.0), LIMITS)
+    memory, peak = np.zeros(law.shape), 60
+    feedback = np.zeros((ticks, 12))
+    feedback[peak - 1 : peak + 2] = 1.0  # three ticks wide, so that a node of either length meets it
+    law.learn(memory, Side.LEFT, np.arange(ticks) / ticks, np.zeros((ticks, 12)), feedback, None)
+    nodes = memory.shape[1]
+    found = (np.flatnonzero(memory[0, :, 3]) + 0.5) / nodes * ticks  # [ticks] where the torque will act
+    assert np.mean(found) == pytest.approx(peak - WAVEFORM.learning_lead / DT, abs=0.7)  # half a node and half a tick
+
+
 def test_smoothing_keeps_constants_and_shifts_nothing() -> None:
     margin, matrix = smoother(50, 2.0)
     np.testing.assert_allclose(matrix @ np.ones(50 + 2 * margin), np.ones(50))
@@ -183,8 +195,8 @@ def test_it_switches_itself_off_and_says_so_when_the_error_grows() -> None:
 
 
 def test_a_learner_that_makes_things_worse_ends_where_it_began() -> None:
-    # A lead of a third of the step turns the correction round: learning with it pumps the error up.
-    wrong = replace(WAVEFORM, learning_lead=0.225, learning_gain=1.0)
+    # A lead of half the step turns the correction round: learning with it pumps the error up.
+    wrong = replace(WAVEFORM, learning_lead=0.5 * WAVEFORM.step_time, learning_gain=1.0)
     learner = StepLearner(wrong, LIMITS)
     leg = Leg(learner, wrong)
     errors = leg.walk(40)
@@ -249,7 +261,7 @@ def test_a_file_that_does_not_fit_is_refused_with_the_reason(tmp_path: Path) -> 
     keeper.save()
     assert refusal(parameters) == ""
     assert refusal(replace(parameters, max_kick_speed=3.0)) == ""  # a kick is no step
-    assert "step_time 0.45; expected 0.5" in refusal(replace(parameters, step_time=0.5))
+    assert f"step_time {parameters.step_time}; expected 0.5" in refusal(replace(parameters, step_time=0.5))
     assert "learning waveform; expected adaptive" in refusal(replace(parameters, learning="adaptive"))
     path.write_bytes(path.read_bytes()[:200])
     assert "damaged" in refusal(parameters)

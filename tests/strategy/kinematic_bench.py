@@ -10,6 +10,7 @@ import numpy as np
 from tulip_description.field import Field, load_field
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.interface import KickGoal, MotionMode, MotionState, Side, Support, WalkCommand, WalkMode
+from tulip_motion.parameters import MotionParameters
 from tulip_strategy.interface import Decision, GamePhase, GameState, UserCommand, UserRequest
 from tulip_strategy.parameters import StrategyParameters
 from tulip_strategy.strategy import Strategy
@@ -18,7 +19,8 @@ from tulip_worldmodel.world_state import ObjectEstimate, RobotEstimate, WorldSta
 STEP = 1.0 / 60.0  # [s] of the fake physics
 STEPS_PER_DECISION = 4  # 15 Hz, as the camera
 LAG = 0.3  # [s] of the legs behind the command
-FEET_FRONT, FEET_BACK, FEET_SIDE = 0.217, 0.007, 0.195  # [m] box of both feet in base_footprint
+KICK_LATERAL = 0.5 * MotionParameters().stance_width  # [m] of the kicking foot
+FEET_FRONT, FEET_BACK, FEET_SIDE = 0.217, 0.007, KICK_LATERAL + 0.075  # [m] box of both feet in base_footprint
 KEEPER_RADIUS = 0.25  # [m]
 ROLLING_DECELERATION = 0.3  # [m/s^2]
 KICK_DURATION, KICK_IMPACT = 2.5, 1.3  # [s] after its start
@@ -226,7 +228,7 @@ class KinematicTrial:
         before = (self.stamp - self.kick_begun) * 1e-9
         if KICK_IMPACT - STEP < before <= KICK_IMPACT:
             x, y = self.robot.inverse().transform(self.ball)
-            offset = y - (0.12 if self.kick.side is Side.LEFT else -0.12)
+            offset = y - (KICK_LATERAL if self.kick.side is Side.LEFT else -KICK_LATERAL)
             if 0.28 < x < 0.42 and abs(offset) < 0.08:
                 direction = self.robot.yaw + self.kick.direction + 1.5 * offset + self.rng.normal(0.0, 0.05)
                 self.ball_velocity = 2.5 * np.array([math.cos(direction), math.sin(direction)])
