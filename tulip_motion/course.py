@@ -7,7 +7,7 @@ import math
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.footsteps import Footstep, centre_beside, foot_beside, plan_footsteps
 from tulip_motion.parameters import MotionParameters
-from tulip_motion.reach import Reach, Velocity, step_time
+from tulip_motion.reach import Reach, Velocity, stance_width, step_time
 
 Wish = Velocity | Pose2D | None
 """A velocity (forward [m/s], left [m/s], turning [rad/s]), a goal for the middle between the feet in odom, or stop."""
@@ -46,7 +46,9 @@ class Course:
             self.note = ""  # a far goal is meant to be walked to as fast as the robot can
         self.velocity = self._smoothed(possible)
         self.step_time = step_time(p, self.velocity[0])
-        steps = plan_footsteps(straight, self.velocity, self.step_time, p.stance_width, PREVIEW_STEPS)
+        steps = plan_footsteps(
+            straight, self.velocity, self.step_time, stance_width(p, self.velocity[0]), PREVIEW_STEPS
+        )
         if isinstance(wish, Pose2D) and self._is_near(wish, straight):
             steps = self._last_steps(wish, straight)
         self._planned = centre_beside(steps[0], p.stance_width)
@@ -134,7 +136,7 @@ def is_at(goal: Pose2D, pose: Pose2D, tolerance: float, tolerance_yaw: float) ->
     return math.hypot(away.x, away.y) <= tolerance and abs(away.yaw) <= tolerance_yaw
 
 
-def middle(feet: tuple[Footstep, Footstep], stance_width: float) -> Pose2D:
+def middle(feet: tuple[Footstep, Footstep], width: float) -> Pose2D:
     """Return the pose midway between the left and the right foot, in odom."""
-    left, right = (centre_beside(foot, stance_width) for foot in feet)
+    left, right = (centre_beside(foot, width) for foot in feet)
     return Pose2D(0.5 * (left.x + right.x), 0.5 * (left.y + right.y), left.yaw + 0.5 * wrap_angle(right.yaw - left.yaw))

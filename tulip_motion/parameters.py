@@ -39,11 +39,12 @@ class MotionParameters:
     first_shift_time: float = _tuned("first_shift_time")  # [s] the ZMP moves over the first stance foot
     stop_shift_time: float = _tuned("stop_shift_time")  # [s] the ZMP moves back between the feet after the last step
     stance_width: float = _tuned("stance_width")  # [m] between the ankles; hips are 0.267 m apart
+    stance_narrowing: float = _tuned("stance_narrowing")  # [m/(m/s)] wide feet hold pushes, narrow ones slip less
     swing_height: float = _tuned("swing_height")  # [m] clears 10 mm of turf and 20 mm of tracking error
     landing_speed: float = _tuned("landing_speed")  # [m/s] the foot goes on down when the ground comes late
     zmp_forward: float = _tuned("zmp_forward")  # [m] aim point of the ZMP ahead of the ankle: the middle of the sole
     zmp_inward: float = _tuned("zmp_inward")  # [m] aim point towards the other foot
-    # Speeds that were walked without a fall or a sliding foot at friction 0.65; the reach of a step limits them as well
+    # Speeds that were walked without a fall at friction 0.6 to 1.0; the reach of a step limits them as well
     max_speed_forward: float = 0.65  # [m/s]
     max_speed_backward: float = 0.35  # [m/s]
     max_speed_sideways: float = 0.3  # [m/s]

@@ -103,6 +103,11 @@ def step_time(parameters: MotionParameters, speed: float) -> float:
     return parameters.step_time + parameters.step_time_growth * abs(speed)
 
 
+def stance_width(parameters: MotionParameters, speed: float) -> float:
+    """Return the distance between the feet sideways [m] at a speed forward or backward [m/s]."""
+    return parameters.stance_width - parameters.stance_narrowing * abs(speed)
+
+
 def fastest_stride(speed: float, stride: float, parameters: MotionParameters) -> float:
     """Return the speed [m/s], or the one at which steps are as long as the stride [m] if that is less."""
     p, growth = parameters, max(parameters.step_time_growth, 1e-9)

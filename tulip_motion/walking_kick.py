@@ -15,7 +15,7 @@ from tulip_motion.interface import KickKind, Side
 from tulip_motion.kick_geometry import gap_between, striking_face
 from tulip_motion.kick_path import Quintic
 from tulip_motion.parameters import MotionParameters
-from tulip_motion.reach import Reach, Velocity, step_time
+from tulip_motion.reach import Reach, Velocity, stance_width, step_time
 
 # Shares of the walk's forward speed at which the steps before the kick are tried, the least change first: a fast walk
 # makes longer strides than what one foot can reach.
@@ -176,7 +176,9 @@ class WalkingKick:
     def _steps(self, stance: Footstep, velocity: Velocity, pace: float, count: int) -> list[Footstep]:
         p = self._parameters
         forward = pace * velocity[0]
-        return plan_footsteps(stance, (forward, velocity[1], velocity[2]), step_time(p, forward), p.stance_width, count)
+        return plan_footsteps(
+            stance, (forward, velocity[1], velocity[2]), step_time(p, forward), stance_width(p, forward), count
+        )
 
     def _find(self, stance: Footstep, trailing: Pose2D, steps: Sequence[Footstep]) -> int | None:
         """Return the first step whose foot can swing through the ball."""

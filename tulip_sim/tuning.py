@@ -35,6 +35,7 @@ SPACE: dict[str, tuple[float, float]] = {
     "first_shift_time": (0.3, 0.8),  # [s]
     "stop_shift_time": (0.3, 0.9),  # [s]
     "stance_width": (0.20, 0.30),  # [m] from soles 50 mm apart to the hips' width
+    "stance_narrowing": (0.0, 0.1),  # [m/(m/s)]
     "swing_height": (0.03, 0.06),  # [m]
     "landing_speed": (0.05, 0.3),  # [m/s]
     "zmp_forward": (0.02, 0.06),  # [m] the sole reaches from -0.065 to 0.145
