@@ -17,7 +17,10 @@ from tulip_motion.parameters import MotionParameters
 from tulip_motion.step_learning import Key, Situation, StepLearner
 
 VERSION = 1
-APART = ("kick_", "max_kick_", "learning_", "limp_", "fall_", "upright_")
+APART = (
+    *("kick_", "max_kick_", "side_kick_", "max_side_kick_", "walking_kick_", "max_walking_kick_", "ball_radius"),
+    *("learning_", "odometry_", "limp_", "fall_", "upright_"),
+)
 """Beginnings of the parameters that leave a step as it is."""
 
 

@@ -1,9 +1,9 @@
-"""The default gait: footsteps, DCM plan, foot placement.
+"""The default gait: footsteps, DCM plan, landings that give way to pushes.
 
 A step begins when a foot lands. Its plan runs over the next footsteps at the present speed and ends
 standing still, so that the robot could stop after it: the DCM reference follows backwards from there.
-While the foot swings, its landing place is moved by the error that the DCM will have grown to at
-touchdown, and the step ends when the foot meets the ground.
+While the foot swings, place and time of its landing are solved together for the measured DCM
+(step_adjustment.py), and the step ends when the foot meets the ground.
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ class Walking:
         self._time_constant = time_constant(parameters.com_height)
         self.feet = feet
         self.course = Course(parameters, reach)
+        """Where the walk goes."""
         self.step_count = 0
         self.finished = False
         self._zmp = zmp
