@@ -21,7 +21,7 @@ DIRECTIONS = (0.0, 0.2, -0.2)  # [rad] wanted; sideways about straight to the le
 OUTWARD_ROOM = 0.125  # [m/rad] farther out lies a ball that is to go outwards, for the run-up beside the other foot
 WANTED = {KickKind.FORWARD: 3.2, KickKind.SIDE: 1.7, KickKind.WALKING: 1.5}  # [m/s]
 LEAST = {KickKind.FORWARD: 3.0, KickKind.SIDE: 1.5, KickKind.WALKING: 1.0}  # [m/s] that count as good
-SIDE_PLACE = (0.112, 0.34)  # [m] ahead and beside: where a side kick expects the ball
+SIDE_PLACE = (0.112, 0.22)  # [m] ahead, and beside the foot: where a side kick expects the ball
 WALK_SPEED = 0.25  # [m/s] as in dribbling
 WALK_ON = 5.0  # [s] after the start of a walking kick the robot has to walk still
 TRIALS = 20  # of each kind
@@ -44,6 +44,9 @@ def measure(kind: KickKind, side: Side, seed: int, direction: float, told: bool)
     walk = (WALK_SPEED, 0.0, 0.0) if kind is KickKind.WALKING else None
     if walk is not None:
         body.go(2.5 + float(rng.uniform(0.0, 0.9)), walk)  # any phase of the two steps
+    else:
+        body.go(1.5, (0.0, 0.0, 0.0))  # the feet as a walk leaves them
+        body.go(2.5)
     base = _footprint(body)
     place = _place(kind, outward, direction, rng)
     body.world.place_ball(*base.transform(place))
@@ -87,7 +90,7 @@ def _place(kind: KickKind, outward: float, direction: float, rng: np.random.Gene
     """Return where the ball lies, (2,) in base_footprint [m]."""
     strategy = StrategyParameters()
     if kind is KickKind.SIDE:
-        ahead, beside = SIDE_PLACE
+        ahead, beside = SIDE_PLACE[0], SIDE_PLACE[1] + strategy.kick_lateral
     else:
         ahead = strategy.kick_ahead if kind is KickKind.FORWARD else float(rng.uniform(0.55, 0.85))
         beside = strategy.kick_lateral + OUTWARD_ROOM * max(0.0, outward * direction)
