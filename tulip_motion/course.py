@@ -51,6 +51,7 @@ class Course:
         )
         if isinstance(wish, Pose2D) and self._is_near(wish, straight):
             steps = self._last_steps(wish, straight)
+        steps[0] = self._reach.within(stance, steps[0])
         self._planned = centre_beside(steps[0], p.stance_width)
         return steps
 

@@ -84,6 +84,9 @@ class StanceTwist:
             self.shift = (self.shift[0] - turned * y, self.shift[1] + turned * x)
 
 
+LONGEST_STEP = 0.6  # [s] more between two landings is standing
+
+
 class DeadReckoning:
     """Counts the way and keeps the covariance of the odometry.
 
@@ -96,6 +99,7 @@ class DeadReckoning:
         self.distance = 0.0
         self._stamp: int | None = None
         self._position = np.zeros(2)
+        self._unknown_tilt = 1.0  # share of the IMU's tilt error that the soles have not told yet
         # odom lies where the robot stood when it was switched on, turned by the error of the first reading
         self._covariance = np.diag([0.0, 0.0, p.odometry_yaw_noise**2, p.odometry_yaw_drift**2])
         linear = (p.odometry_velocity_noise**2,) * 2 + (p.odometry_climb_noise**2,)
@@ -124,6 +128,9 @@ class DeadReckoning:
         turned = 0.5 * sum(abs(wrap_angle(new.yaw - old.yaw)) for old, new in zip(before, after, strict=True))
         self.distance += float(np.hypot(*way))
         self._covariance = self._extrapolated(stamp, position)
+        if self._stamp is not None:
+            step_time = min(1e-9 * (stamp - self._stamp), LONGEST_STEP)
+            self._unknown_tilt *= math.exp(-max(step_time - p.double_support_time, 0.0) / p.imu_bias_time)
         self._stamp, self._position = stamp, position.copy()
         heading = after[0].rotation()
         forward, left = heading.T @ way
@@ -149,8 +156,11 @@ class DeadReckoning:
         """
         p = self._parameters
         planar = self._extrapolated(stamp, position[:2])[:3, :3]
-        # |R(yaw) b - b|^2 of a lean b that turns with the body, and the white noise of now and of the start
-        lean = 2.0 * (1.0 - math.cos(yaw)) * p.odometry_tilt_bias**2 + 2.0 * p.odometry_tilt_noise**2
+        # |k R(yaw) b - b|^2 of a lean b of which a share k is still unknown: that turns with the body, the whole of it
+        # put the start off; and the white noise of now and of the start
+        unknown = self._unknown_tilt
+        lean = (1.0 + unknown**2 - 2.0 * unknown * math.cos(yaw)) * p.odometry_tilt_bias**2
+        lean += 2.0 * p.odometry_tilt_noise**2
         planar[0, 0] += lean * position[2] ** 2
         planar[1, 1] += lean * position[2] ** 2
         planar[YAW, YAW] += p.odometry_yaw_noise**2

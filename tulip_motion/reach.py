@@ -10,7 +10,10 @@ import pinocchio as pin
 
 from tulip_description import frames
 from tulip_description.model import floating_model
+from tulip_description.planar import Pose2D
 from tulip_description.robot import LEG_JOINTS, Robot
+from tulip_motion.footsteps import Footstep
+from tulip_motion.interface import Side
 from tulip_motion.parameters import MotionParameters
 
 Velocity = tuple[float, float, float]
@@ -36,6 +39,14 @@ class Reach:
     backward: float
     sideways: float
     turning: float
+
+    def within(self, stance: Footstep, step: Footstep) -> Footstep:
+        """Return a footstep, moved to where it can be beside the stance foot."""
+        beside = stance.pose.inverse() @ step.pose
+        outward = 1.0 if step.side is Side.LEFT else -1.0
+        x = min(max(beside.x, -self.stride), self.stride)
+        y = outward * min(max(outward * beside.y, self.nearest), self.farthest)
+        return Footstep(step.side, stance.pose @ Pose2D(x, y, beside.yaw))
 
     def limited(self, wanted: Velocity) -> tuple[Velocity, str]:
         """Return the velocity that can be walked, and in words what was taken off, or "".

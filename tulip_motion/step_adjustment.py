@@ -83,7 +83,7 @@ class StepAdjustment:
         if best.excess == 0.0 or fixed_time:
             return best
         least = math.inf
-        count = max(round((latest - p.placement_freeze_time) / (2.0 * p.control_period)), 0) + 1
+        count = max(int((latest - p.placement_freeze_time) / (2.0 * p.control_period) + 1e-9), 0) + 1
         for k in range(count):
             time = p.placement_freeze_time + 2.0 * k * p.control_period
             landing, rest = self._landing(dcm, planned_at_landing, nominal, time)

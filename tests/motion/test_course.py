@@ -140,8 +140,8 @@ def test_steps_to_a_goal_stay_within_reach_and_the_feet_apart(start: Pose2D, goa
         planned = walker.step(goal)
         beside = stance.pose.inverse() @ planned.pose
         outward = beside.y if planned.side is Side.LEFT else -beside.y
-        assert abs(beside.x) <= REACH.stride
-        assert REACH.nearest <= outward <= REACH.farthest
+        assert abs(beside.x) <= REACH.stride + 1e-9
+        assert REACH.nearest - 1e-9 <= outward <= REACH.farthest + 1e-9
         assert abs(beside.yaw) <= REACH.turn
         if walker.course.reached(goal, walker.feet):
             break

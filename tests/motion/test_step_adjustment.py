@@ -94,7 +94,7 @@ def test_pushed_beyond_a_stride_it_lands_early_when_the_foot_is_near(forward: fl
 
 @pytest.mark.parametrize("forward", [0.2, -0.25])
 def test_the_foot_is_given_the_time_that_its_way_takes(forward: float) -> None:
-    foot = (-0.1 * math.copysign(1.0, forward), 0.27)  # still behind
+    foot = (-0.02 * math.copysign(1.0, forward), 0.27)  # still behind
     landing = solve((forward, 0.0), foot=foot)
     way = math.dist(landing.place, foot)
     assert landing.remaining > REMAINING

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from tulip_sim.bench import ilc, kick, trial, walk
+from tulip_sim.bench import ilc, kick, push, stress, trial, walk
 from tulip_sim.bench.runner import Bench, Row, run, save, write_results
 
-BENCHES = (trial.BENCH, walk.BENCH, kick.BENCH, ilc.BENCH)
+BENCHES = (trial.BENCH, walk.BENCH, push.BENCH, kick.BENCH, ilc.BENCH, stress.BENCH)
 
 TRIAL_ROWS: list[Row] = [
     {
@@ -34,20 +34,30 @@ TRIAL_ROWS: list[Row] = [
 ]
 WALK_ROWS: list[Row] = [
     {
-        "speed commanded [m/s]": speed,
+        "walk": "forward 0.6 m/s",
         "seed": seed,
         "friction": 0.8,
-        "upright": upright,
-        "distance [m]": distance,
-        "sideways [m]": sideways,
+        "upright": seed == 1,
+        "time [s]": 60.0,
         "greatest tilt [rad]": 0.1 * seed,
-        "greatest torque by limit": 0.8,
+        "greatest torque by limit": 0.9 - 0.1 * seed,
+        "greatest joint speed [rad/s]": 7.0 + seed,
+        "speed [m/s, rad/s]": 0.64 - 0.03 * seed - 0.03,
+        "off the line after 20 m [m]": 0.2 if seed == 1 else None,
+        "way [m]": [[0.0, 0.0], [1.0, 0.1]],
     }
-    for speed, seed, upright, distance, sideways in (
-        (0.6, 1, False, 3.0, 0.1),
-        (0.4, 1, True, 23.0, 0.5),
-        (0.4, 2, True, 24.0, -1.5),
-    )
+    for seed in (1, 2)
+] + [
+    {
+        "walk": "slalom",
+        "seed": 1,
+        "friction": 0.8,
+        "upright": True,
+        "time [s]": 30.0,
+        "greatest tilt [rad]": 0.1,
+        "greatest torque by limit": 0.8,
+        "greatest joint speed [rad/s]": 8.0,
+    }
 ]
 KICK_ROWS: list[Row] = [
     {
@@ -86,11 +96,11 @@ def test_trials_without_a_goal_have_no_time_to_goal() -> None:
     assert "goals: 0 of 1; median time to goal none" in "\n".join(trial.summarize(TRIAL_ROWS[1:2]))
 
 
-def test_walks_are_summarized_by_speed() -> None:
+def test_walks_are_summarized_one_line_a_walk() -> None:
     lines = walk.summarize(WALK_ROWS)
     assert lines[-2:] == [
-        "| 0.4 m/s | 2 of 2 | 23.5 m of 24 m | 1.5 m | 0.20 rad | 0.80 |",
-        "| 0.6 m/s | 0 of 1 | 3.0 m of 36 m | 0.1 m | 0.10 rad | 0.80 |",
+        "| forward 0.6 m/s, 60 s | 1 of 2 | 0.55, 0.56 m/s | 0.20 m | 0.20 rad | 0.75, 0.80 | 9.0 rad/s |",
+        "| slalom, 30 s | 1 of 1 |  |  | 0.10 rad | 0.80, 0.80 | 8.0 rad/s |",
     ]
 
 
@@ -143,12 +153,44 @@ def test_a_kick_is_measured_kept_and_published(tmp_path: Path) -> None:
 
 @pytest.mark.sim
 def test_a_walk_that_is_cut_short_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(walk, "DURATION", 4.0)
-    row = walk.measure(0.4, 1)
+    monkeypatch.setitem(walk.WALKS, "forward 0.6 m/s", ((0.6, 0.0, 0.0), 8.0, 1))
+    row = walk.measure("forward 0.6 m/s", 1)
     assert row["upright"]
-    assert 0.6 < row["distance [m]"] < 1.6  # it starts from standing
+    assert row["time [s]"] == 8.0
+    assert 0.55 < row["speed [m/s, rad/s]"] < 0.65
+    assert row["off the line after 20 m [m]"] is None  # it did not come so far
     assert 0.6 <= row["friction"] <= 1.0
     assert 0.0 < row["greatest torque by limit"] <= 1.0
+
+
+@pytest.mark.sim
+def test_a_light_push_is_survived_and_a_hard_one_is_not() -> None:
+    assert push.survives(180, 0.4, 5.0, 1)
+    assert not push.survives(180, 0.4, 40.0, 1)
+
+
+def test_the_worst_push_of_a_direction_is_told() -> None:
+    rows = [
+        {"direction [deg]": direction, "phase": phase, "seed": seed, "survived [N s]": 9 + seed + direction // 45}
+        for direction in push.DIRECTIONS
+        for phase in push.PHASES
+        for seed in (1, 2)
+    ]
+    lines = push.summarize(rows)
+    assert any(line.startswith("| 0 deg | 10 |") and line.endswith("| 10 N s |") for line in lines)
+    assert any(line.startswith("| 90 deg |") and line.endswith("| 12 N s |") for line in lines)
+
+
+@pytest.mark.sim
+def test_half_a_minute_of_random_commands_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stress, "DURATION", 16.0)
+    monkeypatch.setattr(stress, "WINDOW", 4.0)
+    row = stress.measure(3)
+    assert row["upright"]
+    assert row["time [s]"] >= 16.0
+    assert 0.5 < row["joint error, first 300 s [mrad]"] < 30.0
+    assert row["memory at the end [MB]"] >= row["memory at 300 s [MB]"] > 0.0
+    assert row["odometry error at the end [m]"] < 0.2
 
 
 def test_all_benches_have_names_of_their_own_and_independent_trials() -> None:

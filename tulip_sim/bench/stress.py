@@ -30,7 +30,8 @@ class Stress:
         self.time = 0.0
         self.errors = np.zeros((round(DURATION / WINDOW) + 1, 2))  # [rad^2] sum over the ticks, and their number
         self.counts = dict.fromkeys(("walk", "stand", "go", "kick", "push"), 0)
-        self._desired = np.zeros(12)
+        self.body.go(0.5)
+        self._desired = self.body.motion.state().joint_positions_desired
 
     def run(self, command: WalkCommand, seconds: float) -> None:
         """Hold a command for a time [s], or until the robot falls."""
