@@ -20,7 +20,9 @@ A node's module is thin:
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, NoReturn, TypeVar
@@ -135,6 +137,25 @@ class ComponentNode(Node):
         return self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
 
+def _spin(spinner: Executor, timeout: float) -> None:
+    """Wait up to so many seconds for work and do it; the program's own signal handlers run after that.
+
+    One that raised inside a callback would have rclpy report the callback as failed.
+    """
+    came: list[int] = []
+    own = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    own = {number: handler for number, handler in own.items() if callable(handler)}
+    for number in own:
+        signal.signal(number, lambda it, _: came.append(it))
+    try:
+        spinner.spin_once(timeout_sec=timeout)
+    finally:
+        for number, handler in own.items():
+            signal.signal(number, handler)
+    if came:
+        signal.raise_signal(came[0])
+
+
 @contextmanager
 def session(
     make_node: Callable[[], N],
@@ -175,7 +196,10 @@ def session(
     spinner = EXECUTORS[choice]()
     spinner.add_node(node)
     try:
-        yield node, lambda timeout: spinner.spin_once(timeout_sec=timeout)
+        if handle_signals or threading.current_thread() is not threading.main_thread():
+            yield node, lambda timeout: spinner.spin_once(timeout_sec=timeout)
+        else:
+            yield node, lambda timeout: _spin(spinner, timeout)
     finally:
         spinner.shutdown()
         node.destroy_node()
