@@ -22,7 +22,9 @@ WAY_STEP = 0.01  # [m] by which run-up and follow-through are shortened until th
 # [m] where the kicking leg's hip is, ahead of and outside the standing ankle, while the CoM is over the standing foot:
 # hips are 0.267 m apart and the CoM falls 0.01 m inside that ankle.
 HIP = (0.018, 0.143)
-SHORTEST_FOLLOW_THROUGH = 0.06  # [m] in which a foot of 1.5 m/s stops with 3 g
+SHORTEST_FOLLOW_THROUGH = 0.06  # [m] at most; in it a foot of 1.5 m/s stops with BRAKING
+BRAKING = 29.0  # [m/s^2] greatest on a follow-through that is as short as it may be, 3 g
+SLOWEST = 0.9  # of the wanted speed, where only a slower foot can stop within the leg's reach
 CLEARANCE_STEP = 0.02  # [m] of the path between two looks at the room beside the other foot
 
 
@@ -31,7 +33,7 @@ class KickStyle:
     """Numbers of one kind of kick.
 
     Attributes:
-        gap: Between the face of the standing foot and the ball, where it is expected [m].
+        gap: Between the face of the standing foot and the ball, where it is expected; at most, for a side kick [m].
         run_up, shortest_run_up, follow_through: Way of the foot before and after the contact [m].
         speed_ratio: Ball's speed over the foot's, measured.
         max_speed: Of the ball [m/s].
@@ -51,10 +53,10 @@ class KickStyle:
     reach: tuple[float, float, float]
 
     @staticmethod
-    def of(parameters: MotionParameters, goal: KickGoal) -> KickStyle:
+    def of(parameters: MotionParameters, kind: KickKind, side: Side) -> KickStyle:
         """Return the numbers for a kick from standing."""
         p = parameters
-        if goal.kind is KickKind.SIDE:
+        if kind is KickKind.SIDE:
             return KickStyle(
                 p.side_kick_gap,
                 p.side_kick_backswing,
@@ -62,7 +64,7 @@ class KickStyle:
                 p.side_kick_follow_through,
                 p.side_kick_speed_ratio,
                 p.max_side_kick_speed,
-                0.5 * math.pi if goal.side is Side.LEFT else -0.5 * math.pi,
+                0.5 * math.pi if side is Side.LEFT else -0.5 * math.pi,
                 p.max_side_kick_direction,
                 (p.side_kick_reach_near, p.side_kick_reach_far, p.side_kick_reach_across),
             )
@@ -101,12 +103,12 @@ def plan_kick(
         feet: Left and right sole in base_footprint.
         soles: Their rectangles.
     """
-    p, style = parameters, KickStyle.of(parameters, goal)
+    p, style = parameters, KickStyle.of(parameters, goal.kind, goal.side)
     refusal = refused_numbers(goal, style.max_speed, style.straight, style.max_direction)
     if refusal:
         return refusal
     home, face = feet[goal.side], striking_face(goal.kind, goal.side, soles[goal.side])
-    expected = face.ball_before(home, style.gap, p.ball_radius)
+    expected = expected_ball(p, goal.kind, goal.side, feet, soles)
     ball = goal.ball if goal.ball is not None else expected
     if out_of_reach(ball, expected, style):
         near, far, across = style.reach
@@ -117,14 +119,17 @@ def plan_kick(
         )
     contact = face.sole_at_contact(ball, goal.direction, p.ball_radius)
     where = f"its swing along {goal.direction:.2f} rad through the ball at ({ball[0]:.2f}, {ball[1]:.2f}) m"
-    follow = style.follow_through
+    foot_speed, follow = goal.speed / style.speed_ratio, style.follow_through
+    slowest = SLOWEST * foot_speed
     while not _in_leg_reach(p, goal, feet, contact, follow):
         follow -= WAY_STEP
-        if follow < SHORTEST_FOLLOW_THROUGH:
+        if follow < shortest_follow_through(slowest):
             return f"the {goal.side.name.lower()} leg is too short for {where}"
+    if follow < shortest_follow_through(foot_speed):
+        foot_speed = math.sqrt(follow * BRAKING / (0.25 * math.pi))
     run_up = style.run_up
     while True:
-        moves = _moves(p, goal.speed / style.speed_ratio, goal.direction, home, contact, run_up, follow)
+        moves = _moves(p, foot_speed, goal.direction, home, contact, run_up, follow)
         reached = _in_leg_reach(p, goal, feet, contact, -run_up)
         if reached and _clear(moves, p.kick_clearance, soles[goal.side], feet[goal.side.other], soles[goal.side.other]):
             return moves
@@ -132,6 +137,37 @@ def plan_kick(
         if run_up < style.shortest_run_up:
             what = "foot would touch the other one on" if reached else "leg is too short for"
             return f"the {goal.side.name.lower()} {what} {where}"
+
+
+def expected_ball(
+    parameters: MotionParameters, kind: KickKind, side: Side, feet: tuple[Pose2D, Pose2D], soles: tuple[Foot, Foot]
+) -> Point:
+    """Return where a kick from standing expects the ball's centre: (x, y) in base_footprint [m].
+
+    A side kick expects it the nearer the wider the feet stand: the leg has to reach it, and some way beyond to stop,
+    also where it lies farthest.
+
+    Args:
+        parameters: Of motion control.
+        kind: FORWARD or SIDE.
+        side: The foot that kicks.
+        feet: Left and right sole in base_footprint.
+        soles: Their rectangles.
+    """
+    p, style = parameters, KickStyle.of(parameters, kind, side)
+    gap = style.gap
+    if kind is KickKind.SIDE:
+        reach = HIP[1] + p.kick_leg_reach - abs((feet[side.other].inverse() @ feet[side]).y)
+        gap = min(gap, max(reach - SHORTEST_FOLLOW_THROUGH - style.reach[1], 0.0))
+    return striking_face(kind, side, soles[side]).ball_before(feet[side], gap, p.ball_radius)
+
+
+def shortest_follow_through(foot_speed: float) -> float:
+    """Return the way [m] beyond the contact that a foot of a speed [m/s] needs at least to stop.
+
+    Along the second half of a cosine profile the greatest deceleration is pi / 4 v^2 / way.
+    """
+    return min(SHORTEST_FOLLOW_THROUGH, 0.25 * math.pi * foot_speed**2 / BRAKING)
 
 
 def out_of_reach(ball: Point, expected: Point, style: KickStyle) -> bool:

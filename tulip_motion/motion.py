@@ -31,7 +31,7 @@ from tulip_motion.interface import (
 )
 from tulip_motion.inverse_kinematics import rotation_z
 from tulip_motion.kick import Kick, moved
-from tulip_motion.kick_plan import plan_kick, refused_numbers
+from tulip_motion.kick_plan import expected_ball, plan_kick, refused_numbers
 from tulip_motion.lipm import time_constant
 from tulip_motion.odometry import DeadReckoning, StanceTwist
 from tulip_motion.paper_gait import PaperGait
@@ -121,15 +121,17 @@ class Motion:
             return self._start_walking_kick(goal)
         if self._mode is not MotionMode.STAND or not self._started:
             return f"motion is in mode {self._mode.name}; a {goal.kind.name.lower()} kick starts from STAND"
-        p, feet = self._parameters, self._feet()
-        base = self._base_footprint()
-        left, right = (base.inverse() @ foot.pose for foot in feet)
-        plan = plan_kick(p, goal, (left, right), self._soles)
+        p, feet, base = self._parameters, self._feet(), self._base_footprint()
+        plan = plan_kick(p, goal, self._feet_in_base(), self._soles)
         if isinstance(plan, str):
             return plan
         self._gait = self._kick = Kick(p, [moved(move, base) for move in plan], feet, feet[goal.side], self._middle())
         self._mode = MotionMode.KICK
         return ""
+
+    def expected_ball(self, kind: KickKind, side: Side) -> tuple[float, float]:
+        """Return where a kick from standing expects the ball, as the feet stand: (x, y) in base_footprint [m]."""
+        return expected_ball(self._parameters, kind, side, self._feet_in_base(), self._soles)
 
     def cancel_kick(self) -> str:
         """Give the running kick up as its phase allows; return "" or the reason why not."""
@@ -243,6 +245,12 @@ class Motion:
     def _feet(self) -> tuple[Footstep, Footstep]:
         left, right = self._estimator.anchors
         return Footstep(Side.LEFT, left), Footstep(Side.RIGHT, right)
+
+    def _feet_in_base(self) -> tuple[Pose2D, Pose2D]:
+        """Return the left and right sole in base_footprint."""
+        to_base = self._base_footprint().inverse()
+        left, right = self._feet()
+        return to_base @ left.pose, to_base @ right.pose
 
     def _middle(self) -> tuple[float, float]:
         p = self._parameters

@@ -112,7 +112,7 @@ class MotionParameters:
     kick_zmp_inward: float = 0.01  # [m] aim point on the stance foot while kicking
     max_kick_speed: float = 3.5  # [m/s] of the ball, from torque and speed of the knee
     max_kick_direction: float = 0.4  # [rad] either side, from the reach of the hip roll
-    side_kick_gap: float = 0.05  # [m] more than ahead, since strategy comes to it sideways
+    side_kick_gap: float = 0.05  # [m] at most; less where the feet stand so wide that the leg would be too short
     side_kick_backswing: float = 0.12  # [m] longest run-up; the other foot leaves less room for most directions
     side_kick_shortest_backswing: float = 0.06  # [m]
     side_kick_follow_through: float = 0.12  # [m]

@@ -18,7 +18,7 @@ from tulip_motion.gait import FootMotion
 from tulip_motion.interface import KickGoal, KickKind, Side
 from tulip_motion.kick_geometry import gap_between, striking_face
 from tulip_motion.kick_path import FootPath, Move, Profile, Quintic, brake
-from tulip_motion.kick_plan import plan_kick
+from tulip_motion.kick_plan import BRAKING, SLOWEST, expected_ball, plan_kick
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import reach, step_time
 from tulip_motion.walking_kick import KickSwing, WalkingKick
@@ -158,6 +158,46 @@ def test_a_side_kick_keeps_clear_of_the_other_foot_and_meets_the_ball_with_its_o
     hit = moves[1].evaluate(moves[1].duration)
     assert outward * hit.velocity[1] == pytest.approx(1.5 / P.side_kick_speed_ratio)
     assert hit.yaw == pytest.approx(0.0)
+
+
+def standing(width: float) -> tuple[Pose2D, Pose2D]:
+    return Pose2D(0.067, 0.5 * width, 0.0), Pose2D(0.067, -0.5 * width, 0.0)
+
+
+def test_a_forward_kick_expects_the_ball_ahead_of_its_foot_however_wide_the_feet_stand() -> None:
+    for width in (0.2, 0.24, 0.3):
+        _, y = expected_ball(P, KickKind.FORWARD, Side.LEFT, standing(width), SOLES)
+        assert y == pytest.approx(0.5 * width)
+
+
+@pytest.mark.parametrize("side", Side)
+def test_a_side_kick_expects_the_ball_nearer_its_foot_when_the_feet_stand_wide(side: Side) -> None:
+    outward = 1.0 if side is Side.LEFT else -1.0
+    gaps = []
+    for width in (0.22, 0.26, 0.28, 0.30):
+        _, y = expected_ball(P, KickKind.SIDE, side, standing(width), SOLES)
+        gaps.append(outward * y - 0.5 * width - 0.075 - P.ball_radius)
+    assert gaps[:2] == pytest.approx([P.side_kick_gap] * 2)
+    assert P.side_kick_gap > gaps[2] > gaps[3] > 0.02
+
+
+@pytest.mark.parametrize("side", Side)
+@pytest.mark.parametrize("width", [0.24, 0.26, 0.28, 0.30])
+def test_a_side_kick_reaches_the_ball_where_it_lies_farthest_whatever_the_stance(side: Side, width: float) -> None:
+    outward, feet = (1.0 if side is Side.LEFT else -1.0), standing(width)
+    x, y = expected_ball(P, KickKind.SIDE, side, feet, SOLES)
+    far = (x, y + outward * (P.side_kick_reach_far - 1e-6))
+    for ahead in (-0.2, 0.0, 0.1):  # [rad]; farther ahead, the foot strikes from farther behind its hip
+        goal = KickGoal(side, outward * (0.5 * math.pi - ahead), 1.7, KickKind.SIDE, far)
+        moves = plan_kick(P, goal, feet, SOLES)
+        assert not isinstance(moves, str), moves
+        speed = float(np.linalg.norm(moves[1].evaluate(moves[1].duration).velocity))
+        assert SLOWEST * 1.7 / P.side_kick_speed_ratio - 1e-9 <= speed <= 1.7 / P.side_kick_speed_ratio + 1e-9
+        stop = max(
+            float(np.linalg.norm(moves[2].evaluate(time).acceleration))
+            for time in np.linspace(0.0, moves[2].duration, 50)
+        )
+        assert stop < 1.05 * BRAKING
 
 
 LEFT = Side.LEFT

@@ -9,6 +9,7 @@ import pytest
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.interface import KickGoal, KickKind, MotionMode, Side, WalkCommand, WalkMode
 from tulip_sim.bench.body import Body
+from tulip_strategy.parameters import StrategyParameters
 
 pytestmark = pytest.mark.sim
 WALK = (0.25, 0.0, 0.0)
@@ -64,12 +65,25 @@ def test_a_slow_forward_kick_sends_the_ball_slowly() -> None:
 @pytest.mark.parametrize("side", Side)
 def test_a_side_kick_sends_the_ball_to_its_side(side: Side) -> None:
     outward = 1.0 if side is Side.LEFT else -1.0
-    body = standing((0.112, outward * 0.34))
+    body = standing((0.5, 0.0))
+    x, y = body.motion.expected_ball(KickKind.SIDE, side)
+    body.world.place_ball(-2.0 + x, y)
     assert body.motion.start_kick(KickGoal(side, outward * 0.5 * math.pi, 1.7, KickKind.SIDE)) == ""
     body.go(4.5)
     assert body.motion.mode is MotionMode.STAND
     assert body.ball_speed > 1.5
     assert abs(direction_error(body, outward * 0.5 * math.pi)) < 5.0
+
+
+@pytest.mark.parametrize("side", Side)
+def test_strategy_lines_the_ball_up_where_a_forward_kick_expects_it(side: Side) -> None:
+    strategy = StrategyParameters()
+    outward = 1.0 if side is Side.LEFT else -1.0
+    body = standing((2.0, 0.0))
+    body.go(1.5, (0.0, 0.0, 0.0))  # the feet as a walk leaves them
+    body.go(2.5)
+    expected = body.motion.expected_ball(KickKind.FORWARD, side)
+    assert expected == pytest.approx((strategy.kick_ahead, outward * strategy.kick_lateral), abs=0.01)
 
 
 @pytest.mark.parametrize("side", Side)

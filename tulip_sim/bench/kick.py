@@ -21,7 +21,6 @@ DIRECTIONS = (0.0, 0.2, -0.2)  # [rad] wanted; sideways about straight to the le
 OUTWARD_ROOM = 0.125  # [m/rad] farther out lies a ball that is to go outwards, for the run-up beside the other foot
 WANTED = {KickKind.FORWARD: 3.2, KickKind.SIDE: 1.7, KickKind.WALKING: 1.5}  # [m/s]
 LEAST = {KickKind.FORWARD: 3.0, KickKind.SIDE: 1.5, KickKind.WALKING: 1.0}  # [m/s] that count as good
-SIDE_PLACE = (0.112, 0.22)  # [m] ahead, and beside the foot: where a side kick expects the ball
 WALK_SPEED = 0.25  # [m/s] as in dribbling
 WALK_ON = 5.0  # [s] after the start of a walking kick the robot has to walk still
 TRIALS = 20  # of each kind
@@ -48,7 +47,7 @@ def measure(kind: KickKind, side: Side, seed: int, direction: float, told: bool)
         body.go(1.5, (0.0, 0.0, 0.0))  # the feet as a walk leaves them
         body.go(2.5)
     base = _footprint(body)
-    place = _place(kind, outward, direction, rng)
+    place = _place(kind, side, direction, body, rng)
     body.world.place_ball(*base.transform(place))
     seen = place + rng.normal(0.0, SIGHT_ERROR, 2)
     wanted = direction + (outward * 0.5 * math.pi if kind is KickKind.SIDE else 0.0)
@@ -86,15 +85,17 @@ def _footprint(body: Body) -> Pose2D:
     return Pose2D(float(truth.base_position[0]), float(truth.base_position[1]), yaw)
 
 
-def _place(kind: KickKind, outward: float, direction: float, rng: np.random.Generator) -> np.ndarray:
+def _place(kind: KickKind, side: Side, direction: float, body: Body, rng: np.random.Generator) -> np.ndarray:
     """Return where the ball lies, (2,) in base_footprint [m]."""
     strategy = StrategyParameters()
     if kind is KickKind.SIDE:
-        ahead, beside = SIDE_PLACE[0], SIDE_PLACE[1] + strategy.kick_lateral
+        place = body.motion.expected_ball(kind, side)
     else:
         ahead = strategy.kick_ahead if kind is KickKind.FORWARD else float(rng.uniform(0.55, 0.85))
+        outward = 1.0 if side is Side.LEFT else -1.0
         beside = strategy.kick_lateral + OUTWARD_ROOM * max(0.0, outward * direction)
-    return np.array([ahead, outward * beside]) + rng.normal(0.0, PLACE_ERROR, 2)
+        place = ahead, outward * beside
+    return np.array(place) + rng.normal(0.0, PLACE_ERROR, 2)
 
 
 def summarize(rows: list[Row]) -> list[str]:
