@@ -14,7 +14,7 @@ import os
 import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 import optuna
@@ -28,6 +28,7 @@ from tulip_sim.tuning import SPACE, Figures, check_names, evaluate
 
 STUDY = "gait"
 SETTINGS = "settings"
+FIGURES = [field.name for field in fields(Figures)]
 
 
 class StudyError(Exception):
@@ -82,9 +83,11 @@ class Tuner:
                 f"Study {path} is damaged or no study ({type(error).__name__}: {error}). Move it away, or name another."
             ) from error
         if known is None:
-            self._study.set_user_attr(SETTINGS, settings.__dict__)
+            self._study.set_user_attr(SETTINGS, {**asdict(settings), "figures": FIGURES})
             self._study.enqueue_trial(settings.base)  # the first trial is the gait that has to be beaten
             self.settings = settings
+        elif known.get("figures") != FIGURES:
+            raise StudyError(f"Study {path} judged gaits by other figures than this code does. Begin another study.")
         else:
             self.settings = TuningSettings(int(known["seeds"]), float(known["seconds"]), dict(known["base"]))
             if (self.settings.seeds, self.settings.seconds) != (settings.seeds, settings.seconds):
@@ -155,7 +158,7 @@ class Tuner:
         if not self.finished:
             raise StudyError(f"Study {self._path} holds no finished trial; run some first.")
         trial = self._study.best_trial
-        figures = Figures(**{name: float(trial.user_attrs[name]) for name in Figures(0, 0, 0, 0, 0).as_dict()})
+        figures = Figures(**{name: float(trial.user_attrs[name]) for name in FIGURES})
         return float(trial.value or 0.0), figures, {**self.settings.base, **trial.params}
 
     def apply(self, path: Path = GAIT) -> None:
@@ -169,7 +172,7 @@ class Tuner:
         provenance = (
             "",
             f"Best of {self.finished} gaits, each judged by walks of {self.settings.seconds:g} s forward, sideways,",
-            f"backward, turning, starting and stopping, and pushed, in {self.settings.seeds} random worlds each",
+            f"backward, turning, starting and stopping, and by pushes, in {self.settings.seeds} random worlds each",
             f"(tulip_sim/tuning.py): cost {cost:.3f}; "
             + ", ".join(f"{name.replace('_', ' ')} {value:.3f}" for name, value in figures.as_dict().items()),
         )

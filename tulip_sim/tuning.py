@@ -1,14 +1,17 @@
 """What the gait tuner looks for: which parameters, within which bounds, and what makes a gait good.
 
-A candidate is judged by randomised walks of every kind and by pushes while walking; the same seeds for all
-candidates, so that they differ in the gait alone. `Figures` are means over the walks; `cost` weighs them such that
-each line of this list matters only among gaits that are about equal in the lines above it:
+A candidate is judged by randomised walks of every kind and by single pushes as in bench `push`; the same seeds for
+all candidates, so that they differ in the gait alone. The forward walk is the fastest, on the most slippery carpet.
+`Figures` are means; `cost` weighs them such that each line of this list matters only among gaits that are about equal
+in the lines above it:
 
-1. survival: share of the time asked for that the robot stayed upright, in walks and among pushes (weight 100)
-2. speed: what lacks of the commanded speed, as a share of it (10)
-3. torque: greatest torque by its limit; only what is above three quarters of it (4)
-4. joint speed: greatest joint speed by its limit; only what is above three quarters (2)
-5. drift: speed across the commanded direction, and turning that was not asked for, by the commanded speed (1)
+1. survival: share of the time asked for that the robot stayed upright in walks (weight 100)
+2. pushes: share of the pushes survived; one that was not counts by the time that the robot stayed upright, at most
+   half, so that a fall that was nearly caught is better than one that was not (40: one push of 16 is worth 2.5)
+3. speed: what lacks of the commanded speed, as a share of it (10)
+4. torque: greatest torque by its limit; only what is above three quarters of it (4)
+5. joint speed: greatest joint speed by its limit; only what is above three quarters (2)
+6. drift: speed across the commanded direction, and turning that was not asked for, by the commanded speed (1)
 """
 
 from __future__ import annotations
@@ -23,6 +26,8 @@ from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.interface import WalkCommand, WalkMode
 from tulip_motion.parameters import MotionParameters
 from tulip_sim.bench.body import Body
+from tulip_sim.bench.push import AFTER, DIRECTIONS, PHASES, time_upright
+from tulip_sim.parameters import WorldParameters
 from tulip_sim.timing import TICK
 
 START = Pose2D(0.0, 40.0, 0.0)  # off the field, where nothing is in the way
@@ -60,19 +65,34 @@ SPACE: dict[str, tuple[float, float]] = {
 }
 """Bounds of every parameter in gait.yaml."""
 
-WALKS = ("forward", "sideways", "backward", "turn", "start_stop", "push")
-PUSH = 10.0  # [N s] on the torso, within 0.1 s
-PUSH_PERIOD = 2.0  # [s]
+WALKS = ("forward", "sideways", "backward", "turn", "start_stop")
+SLIPPERY = WorldParameters(friction=(WorldParameters.friction[0],) * 2)
+PUSH = (11.0, 12.0)  # [N s] range
+WEAK_PUSHES = (
+    *((45, 0.8), (135, 0.4), (135, 0.6), (270, 0.8), (315, 0.05), (315, 0.2)),
+    *((225, 0.6), (90, 0.4), (45, 0.05), (90, 0.05), (90, 0.2), (0, 0.8)),
+)
+"""Direction [deg] and phase of pushes that gaits survived least."""
+_PHASES = tuple(phase for phase in PHASES if phase is not None)
+# Strides that share no divisor with the lengths lead to every pair once, and neighbours differ in both.
+_PUSHES = (
+    (DIRECTIONS[3 * i % len(DIRECTIONS)], _PHASES[i % len(_PHASES)]) for i in range(len(DIRECTIONS) * len(_PHASES))
+)
+OTHER_PUSHES = tuple(push for push in _PUSHES if push not in WEAK_PUSHES)
+"""The other pushes while walking of bench `push`."""
+WEAK_SHARE, OTHER_SHARE = 6, 2  # pushes a seed of each kind; the next seed has the next ones
+FALL_SHARE = 0.5  # of a push survived, at most, for one that was not
 LONGEST_PULSE = 2.0  # [s] of walking, then as long of standing, in "start_stop"
 PLENTY = 0.75  # share of a motor's limit that costs nothing
 
 
 @dataclass(frozen=True)
 class Figures:
-    """What walks came to, each a mean over them.
+    """What walks and pushes came to, each a mean over them.
 
     Attributes:
-        survival: Share of the time that the robot was upright.
+        survival: Share of the time that the robot was upright in walks.
+        pushes: Share of the pushes survived; see the module's text.
         speed: Speed realised in the commanded direction, by the commanded one; 1 is exact.
         torque: Greatest torque of any joint by its limit.
         joint_speed: Greatest speed of any joint by its limit.
@@ -80,6 +100,7 @@ class Figures:
     """
 
     survival: float
+    pushes: float
     speed: float
     torque: float
     joint_speed: float
@@ -90,6 +111,7 @@ class Figures:
         """What the tuner makes small; see the module's text."""
         return (
             100.0 * (1.0 - self.survival)
+            + 40.0 * (1.0 - self.pushes)
             + 10.0 * min(max(1.0 - self.speed, 0.0), 1.0)
             + 4.0 * max(self.torque - PLENTY, 0.0)
             + 2.0 * max(self.joint_speed - PLENTY, 0.0)
@@ -115,11 +137,11 @@ def check_names(names: Collection[str]) -> None:
 
 
 def evaluate(values: Mapping[str, float], seeds: Collection[int], seconds: float) -> Figures:
-    """Judge a gait by all walks with all seeds.
+    """Judge a gait by all walks and pushes with all seeds.
 
     Args:
         values: Parameters that differ from their defaults.
-        seeds: Of the worlds: masses, friction, sensor errors, directions of pushes.
+        seeds: Of the worlds: masses, friction, sensor errors; and of the choice of pushes.
         seconds: Length of each walk.
 
     Returns:
@@ -128,19 +150,45 @@ def evaluate(values: Mapping[str, float], seeds: Collection[int], seconds: float
     try:
         parameters = replace(MotionParameters(), **dict(values))  # type: ignore[arg-type]  # all are numbers
     except ValueError:
-        return Figures(0.0, 0.0, 2.0, 2.0, 1.0)
-    figures = [try_walk(walk, parameters, seed, seconds) for walk in WALKS for seed in seeds]
-    means = np.mean([list(each.as_dict().values()) for each in figures], axis=0)
-    return Figures(*(float(value) for value in means))
+        return Figures(0.0, 0.0, 0.0, 2.0, 2.0, 1.0)
+    walks = [try_walk(walk, parameters, seed, seconds) for walk in WALKS for seed in seeds]
+    pushes = [share for seed in seeds for share in try_pushes(parameters, seed)]
+    means = {name: float(np.mean([walk[name] for walk in walks])) for name in walks[0]}
+    return Figures(pushes=float(np.mean(pushes)), **means)
 
 
-def try_walk(walk: str, parameters: MotionParameters, seed: int, seconds: float) -> Figures:
-    """Walk once.
+def pushes_of(seed: int) -> list[tuple[int, float, float]]:
+    """Return direction [deg], phase and impulse [N s] of the pushes of a seed.
+
+    Two seeds have all the weak pushes of the list, and each has others besides.
+    """
+    rng = np.random.default_rng([seed, len(WALKS)])
+    weak = [WEAK_PUSHES[(WEAK_SHARE * seed + i) % len(WEAK_PUSHES)] for i in range(WEAK_SHARE)]
+    others = [OTHER_PUSHES[(OTHER_SHARE * seed + i) % len(OTHER_PUSHES)] for i in range(OTHER_SHARE)]
+    return [(direction, phase, float(rng.uniform(*PUSH))) for direction, phase in weak + others]
+
+
+def try_pushes(parameters: MotionParameters, seed: int) -> list[float]:
+    """Push a robot, each time from a fresh start.
+
+    Args:
+        parameters: Of motion control.
+        seed: Of the world and of the choice of pushes.
+
+    Returns:
+        For each push 1 if it was survived, else less, by the time that the robot stayed upright.
+    """
+    times = [time_upright(direction, phase, impulse, seed, parameters) for direction, phase, impulse in pushes_of(seed)]
+    return [1.0 if time >= AFTER else FALL_SHARE * time / AFTER for time in times]
+
+
+def try_walk(walk: str, parameters: MotionParameters, seed: int, seconds: float) -> dict[str, float]:
+    """Walk once and return the figures by name, without pushes.
 
     Args:
         walk: One of WALKS.
         parameters: Of motion control.
-        seed: Of the world and of the pushes.
+        seed: Of the world.
         seconds: How long.
     """
     p, rng = parameters, np.random.default_rng([seed, WALKS.index(walk)])
@@ -150,23 +198,18 @@ def try_walk(walk: str, parameters: MotionParameters, seed: int, seconds: float)
         "backward": (-p.max_speed_backward, 0.0, 0.0),
         "turn": (0.0, 0.0, p.max_turn_rate * float(rng.choice((-1.0, 1.0)))),
         "start_stop": (0.7 * p.max_speed_forward, 0.0, 0.0),
-        "push": (0.2, 0.0, 0.0),
     }[walk]
     go, stand = WalkCommand(0, WalkMode.WALK, (forward, left, turn)), WalkCommand(0, WalkMode.STAND)
-    body = Body(seed, START, ball=(0.0, 0.0), parameters=p)
+    world = SLIPPERY if walk == "forward" else WorldParameters()
+    body = Body(seed, START, ball=(0.0, 0.0), parameters=p, world=world)
     body.go(0.3)
     efforts, speeds = body.world.robot.effort_limits, body.world.robot.velocity_limits
     ticks, fastest, upright, moved = round(seconds * 1000 / TICK), 0.0, 0, np.zeros(3)
-    pulse, next_push = min(LONGEST_PULSE, seconds / 2.0), float(rng.uniform(0.3, 1.0)) * min(PUSH_PERIOD, seconds / 2)
+    pulse = min(LONGEST_PULSE, seconds / 2.0)
     before = _planar(body)
     walking = 0.0
     for k in range(ticks):
-        time = k * TICK / 1000.0
-        standing = walk == "start_stop" and time % (2.0 * pulse) >= pulse
-        if walk == "push" and time >= next_push:
-            direction = rng.uniform(-math.pi, math.pi)
-            body.world.push((10.0 * PUSH * math.cos(direction), 10.0 * PUSH * math.sin(direction), 0.0), 100)
-            next_push += PUSH_PERIOD + float(rng.uniform(0.0, p.step_time))
+        standing = walk == "start_stop" and k * TICK / 1000.0 % (2.0 * pulse) >= pulse
         body.tick(stand if standing else go)
         now = _planar(body)
         step = now - before
@@ -189,7 +232,7 @@ def _figures(
     body: Body,
     fastest: float,
     efforts: np.ndarray,
-) -> Figures:
+) -> dict[str, float]:
     scale = np.array([1.0, 1.0, 0.3])  # [m/rad] makes a turning rate a speed: about that of the feet
     asked = scale * np.array(wanted) * walking
     real = scale * moved
@@ -197,7 +240,13 @@ def _figures(
     along = float(real @ asked) / length
     across = float(np.linalg.norm(real - along * asked / length))
     torque = float((body.greatest_efforts / efforts).max())
-    return Figures(survival, along / length, torque, fastest, across / length)
+    return {
+        "survival": survival,
+        "speed": along / length,
+        "torque": torque,
+        "joint_speed": fastest,
+        "drift": across / length,
+    }
 
 
 def _planar(body: Body) -> np.ndarray:

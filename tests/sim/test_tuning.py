@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -13,8 +14,10 @@ from typer.testing import CliRunner, Result
 from tulip_motion.gait_file import PATH, GaitFile, GaitFileError, read_gait, write_gait
 from tulip_motion.parameters import MotionParameters
 from tulip_ros.plan import read_parameters
+from tulip_sim import tuning
+from tulip_sim.bench.push import DIRECTIONS, PHASES
 from tulip_sim.tuner import Tuner, TuningSettings
-from tulip_sim.tuning import SPACE, Figures, evaluate, try_walk
+from tulip_sim.tuning import SPACE, WEAK_PUSHES, Figures, evaluate, pushes_of, try_pushes, try_walk
 
 SHORT = ["--trials", "1", "--seeds", "1", "--seconds", "1", "--workers", "1"]
 
@@ -73,11 +76,12 @@ def test_missing_and_unknown_names_in_a_gait_file_are_named(tmp_path: Path) -> N
         GaitFile(tmp_path / "none.yaml")
 
 
-def test_cost_orders_survival_then_speed_then_effort_then_drift() -> None:
-    good = Figures(1.0, 1.0, 0.7, 0.7, 0.0)
+def test_cost_orders_survival_then_pushes_then_speed_then_effort_then_drift() -> None:
+    good = Figures(1.0, 1.0, 1.0, 0.7, 0.7, 0.0)
     drifts, fast_joints = replace(good, drift=0.2), replace(good, joint_speed=1.0)
     strains, slow, falls = replace(good, torque=1.0), replace(good, speed=0.8), replace(good, survival=0.9)
-    costs = [each.cost for each in (good, drifts, fast_joints, strains, slow, falls)]
+    pushed_over = replace(good, pushes=15.0 / 16.0)
+    costs = [each.cost for each in (good, drifts, fast_joints, strains, slow, pushed_over, falls)]
     assert costs == sorted(costs) and len(set(costs)) == len(costs)
 
 
@@ -86,8 +90,41 @@ def test_a_gait_that_cannot_walk_costs_more_than_the_committed_one() -> None:
     gait = MotionParameters()
     committed = try_walk("forward", gait, 0, 3.0)
     clumsy = try_walk("forward", replace(gait, dcm_gain=0.0, placement_gain=0.0), 0, 3.0)
-    assert committed.survival == 1.0
-    assert committed.cost < clumsy.cost
+    assert committed["survival"] == 1.0
+    assert cost(committed) < cost(clumsy)
+
+
+def cost(walk: dict[str, float]) -> float:
+    return Figures(pushes=1.0, **walk).cost
+
+
+def test_two_seeds_are_pushed_in_all_the_weak_ways_and_fourteen_in_every_way_of_the_bench() -> None:
+    seen = [{push[:2] for push in pushes_of(seed)} for seed in range(14)]
+    assert set(WEAK_PUSHES) <= seen[0] | seen[1]
+    assert set().union(*seen) == set(product(DIRECTIONS, (phase for phase in PHASES if phase is not None)))
+    assert len(seen[0]) == len(pushes_of(0)) == 8
+    assert not seen[0] & seen[1]
+    assert pushes_of(3) == pushes_of(3)
+
+
+@pytest.mark.sim
+def test_a_push_counts_fully_when_it_is_survived_and_by_the_time_upright_when_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    light, strong = (0, 0.6, 4.0), (0, 0.6, 30.0)
+    monkeypatch.setattr(tuning, "pushes_of", lambda seed: [light, strong])
+    held, fell = try_pushes(MotionParameters(), 0)
+    assert held == 1.0
+    assert 0.02 < fell < 0.5  # it takes some time to fall, and by far not all of it
+
+
+@pytest.mark.sim
+def test_a_gait_that_does_not_come_to_the_push_earns_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tuning, "pushes_of", lambda seed: [(0, 1.5, 11.0)])
+    assert try_pushes(MotionParameters(), 0) == [0.0]
+    monkeypatch.setattr(tuning, "pushes_of", lambda seed: [(0, 0.6, 11.0)])
+    falls = replace(MotionParameters(), dcm_gain=-0.9, placement_gain=-1.0)
+    assert try_pushes(falls, 0) == [0.0]
 
 
 def test_values_that_motion_refuses_cost_more_than_any_fall() -> None:
@@ -95,7 +132,8 @@ def test_values_that_motion_refuses_cost_more_than_any_fall() -> None:
 
 
 @pytest.mark.sim
-def test_a_study_runs_goes_on_and_is_applied_to_a_gait_file(tmp_path: Path) -> None:
+def test_a_study_runs_goes_on_and_is_applied_to_a_gait_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tuning, "pushes_of", lambda seed: [(0, 0.2, 11.0)])  # workers are copies of this process
     study, gait = tmp_path / "study.jsonl", tmp_path / "gait.yaml"
     first = run("--study", str(study), "--space", "step_time,dcm_gain")
     assert first.exit_code == 0, first.output

@@ -12,8 +12,10 @@ from matplotlib.projections.polar import PolarAxes
 
 from tulip_description.planar import Pose2D
 from tulip_motion.interface import MotionMode, Side, WalkCommand, WalkMode
+from tulip_motion.parameters import MotionParameters
 from tulip_sim.bench.body import Body
 from tulip_sim.bench.runner import Bench, Row
+from tulip_sim.timing import TICK
 
 DIRECTIONS = tuple(range(0, 360, 45))  # [deg] of the force, 0 forward, 90 to the left
 PHASES: tuple[float | None, ...] = (0.05, 0.2, 0.4, 0.6, 0.8, None)  # of a step on the left foot; None: standing
@@ -21,7 +23,9 @@ SEEDS = 4
 SPEED = 0.2  # [m/s] of the walk
 PULSE = 100  # [ms]
 FIRST, LAST = 8, 16  # [N s] weakest and strongest push, in steps of 1
+BEFORE = 8.0  # [s] of walking in which the phase has to come
 AFTER = 4.0  # [s] to stay upright after the push
+TICKS_PER_SECOND = 1000 / TICK
 BAR = 10.0  # [N s]
 
 
@@ -40,21 +44,45 @@ def measure(direction: int, phase: float | None, seed: int) -> Row:
 
 def survives(direction: int, phase: float | None, impulse: float, seed: int) -> bool:
     """Return whether the robot stays upright after one push on its torso."""
-    body = Body(seed, Pose2D())
+    return time_upright(direction, phase, impulse, seed) >= AFTER
+
+
+def time_upright(
+    direction: float, phase: float | None, impulse: float, seed: int, parameters: MotionParameters | None = None
+) -> float:
+    """Push a robot once and return how long it stays upright after it.
+
+    Args:
+        direction: Of the force on the torso [deg], 0 forward, 90 to the left.
+        phase: Of a step on the left foot, after the first steps of a walk; None while standing.
+        impulse: [N s].
+        seed: Of the world.
+        parameters: Of motion control, by default the committed ones.
+
+    Returns:
+        The time until it falls [s], AFTER if it does not; 0 if it falls, or never gets there, before the push.
+    """
+    body = Body(seed, Pose2D(), parameters=parameters)
     body.go(0.5)
     command = WalkCommand(0, WalkMode.STAND)
     if phase is not None:
         command = WalkCommand(0, WalkMode.WALK, (SPEED, 0.0, 0.0))
         # The first steps speed up; the phase is that of the first step on the left foot after them.
-        while not _is_at(body, phase):
+        for _ in range(round(BEFORE * TICKS_PER_SECOND)):
+            if _is_at(body, phase):
+                break
+            if body.fallen:
+                return 0.0
             body.tick(command)
+        else:
+            return 0.0
     angle, force = math.radians(direction), 1000.0 * impulse / PULSE
     body.world.push([force * math.cos(angle), force * math.sin(angle), 0.0], PULSE)
-    for _ in range(round(AFTER * 250.0)):
+    for k in range(round(AFTER * TICKS_PER_SECOND)):
         body.tick(command)
         if body.fallen:
-            return False
-    return True
+            return k / TICKS_PER_SECOND
+    return AFTER
 
 
 def _is_at(body: Body, phase: float) -> bool:
