@@ -21,7 +21,7 @@ from tulip_description.field import load_field
 from tulip_description.robot import load_robot
 from tulip_motion.interface import MotionMode, Support
 from tulip_sim.camera import CameraParameters, CameraRenderer
-from tulip_sim.lockstep import Lockstep, robot_pose
+from tulip_sim.lockstep import Lockstep
 from tulip_sim.scenario import make_scenario
 from tulip_sim.spectator import Spectator, behind
 from tulip_sim.truth import Truth
@@ -62,7 +62,7 @@ class HeadCamera:
 
 def worth_a_picture(trial: Lockstep, truth: Truth) -> bool:
     """Return whether the robot walks behind the ball in the half of the goal that it attacks."""
-    legs, pose = trial.motion.state(), robot_pose(truth)
+    legs, pose = trial.motion.state(), truth.footprint
     ahead, aside = (truth.ball_position[:2] - [pose.x, pose.y]) @ pose.rotation()
     return (
         legs.mode is MotionMode.WALK
@@ -106,7 +106,7 @@ def main(
         raise typer.Exit(1)
     truth, seen = found
     field = load_field()
-    view = Spectator(field, load_robot()).render(truth, behind(robot_pose(truth), field.opponent_goal))
+    view = Spectator(field, load_robot()).render(truth, behind(truth.footprint, field.opponent_goal))
     folder.mkdir(parents=True, exist_ok=True)
     for name, picture in (("match.png", view), ("camera.png", seen)):
         cv2.imwrite(str(folder / name), picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tulip_description.model import OPTICAL_ROTATION
+from tulip_description.quaternion import quaternion_matrix
 from tulip_description.robot import Robot
 
 Array = NDArray[np.float64]
@@ -51,14 +52,7 @@ def _level_rotation(quaternion: ArrayLike) -> Array:
     q = np.asarray(quaternion, dtype=float)
     if q.shape != (4,) or not abs(float(q @ q) - 1.0) < 1e-3:
         raise ValueError(f"base_orientation_xyzw is {q}; expected a unit quaternion of shape (4,)")
-    x, y, z, w = q / math.sqrt(float(q @ q))
-    rotation = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    rotation = quaternion_matrix((q / math.sqrt(float(q @ q))).tolist())
     yaw = math.atan2(rotation[1, 0], rotation[0, 0])
     c, s = math.cos(yaw), math.sin(yaw)
     level: Array = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ rotation

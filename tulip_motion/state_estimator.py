@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 
 from tulip_description import frames
 from tulip_description.planar import Pose2D
+from tulip_description.quaternion import Quaternion, quaternion_conjugate, quaternion_product, quaternion_yaw
 from tulip_description.robot_io import Sensors
 from tulip_motion.footsteps import Footstep
 from tulip_motion.interface import Side
 from tulip_motion.parameters import MotionParameters
 
 Array = NDArray[np.float64]
-Quaternion = tuple[float, float, float, float]
-"""x, y, z, w; of unit length."""
 Point = tuple[float, float, float]
 
 
@@ -237,30 +236,6 @@ class StateEstimator:
             x += load * px + xx * forward + xy * left
             y += load * py + yx * forward + yy * left
         return np.array((x / total, y / total))
-
-
-def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Return a b, the rotation b followed by a. Plain numbers: an object for each would take longer."""
-    ax, ay, az, aw = a
-    bx, by, bz, bw = b
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
-
-
-def quaternion_conjugate(a: Quaternion) -> Quaternion:
-    """Return the inverse rotation."""
-    x, y, z, w = a
-    return -x, -y, -z, w
-
-
-def quaternion_yaw(a: Quaternion) -> float:
-    """Return the heading of the rotated x axis [rad]."""
-    x, y, z, w = a
-    return math.atan2(2.0 * (x * y + w * z), w * w + x * x - y * y - z * z)
 
 
 def planar_pose(transform: Array) -> Pose2D:

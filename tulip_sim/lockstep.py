@@ -7,7 +7,7 @@ answers, features arrive some ticks after their picture.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.field import Field, load_field
-from tulip_description.planar import Pose2D
 from tulip_description.robot import Robot, load_robot
 from tulip_description.robot_io import JointCommand
 from tulip_motion.head import HeadMovement, HeadParameters
@@ -28,7 +27,6 @@ from tulip_sim.parameters import WorldParameters
 from tulip_sim.referee import Outcome, Referee, RefereeParameters
 from tulip_sim.scenario import Scenario
 from tulip_sim.timing import CAMERA_TICKS, DECISION_TICKS, FEATURE_DELAY_TICKS, SLOW_TICKS, TICK
-from tulip_sim.truth import Truth
 from tulip_sim.world import World
 from tulip_strategy.game_input import GameInput, GameInputParameters
 from tulip_strategy.interface import Decision, GameState, UserCommand, UserRequest
@@ -38,7 +36,6 @@ from tulip_vision.pipeline import VisionParameters
 from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParameters
 from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
 
-Vector = Sequence[float] | NDArray[np.float64]
 Listener = Callable[[str, int, object], None]
 """Is told everything that passes between components: topic name, stamp [ns], object."""
 
@@ -206,15 +203,3 @@ class Lockstep:
         game = self.game_input.state(stamp)
         if game is not None:
             self._tell("game_state", stamp, game)
-
-
-def robot_pose(truth: Truth) -> Pose2D:
-    """Return base_footprint in map."""
-    return planar_pose(truth.base_position, truth.base_orientation)
-
-
-def planar_pose(position: Vector, orientation: Vector) -> Pose2D:
-    """Return the pose on the ground of a position (x, y, ...) [m] and a quaternion x, y, z, w."""
-    x, y, z, w = orientation
-    yaw = float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
-    return Pose2D(float(position[0]), float(position[1]), yaw)

@@ -11,6 +11,7 @@ import numpy as np
 
 from tulip_description.field import load_field
 from tulip_description.planar import Pose2D
+from tulip_description.quaternion import pose_on_ground
 from tulip_msgs.msg import Decision, GroundTruth, WorldState
 from tulip_ros import topics
 from tulip_ros.errors import BadInputError, unknown
@@ -18,7 +19,6 @@ from tulip_ros.launch import Launcher
 from tulip_ros.plan import Start, make_plan, read_parameters
 from tulip_ros.run import ComponentNode, session
 from tulip_ros.time import stamp_of
-from tulip_sim.lockstep import planar_pose
 from tulip_sim.scenario import SCENARIOS, make_scenario
 from tulip_sim.trial import TrialObserver, TrialSummary
 from tulip_strategy.game_controller import REFEREE_PORT
@@ -58,7 +58,7 @@ class TrialWatcher(ComponentNode):
         if self.first is None:
             self.first = (self.heard, stamp_of(message))
         pose, turn = message.robot.position, message.robot.orientation
-        self.observer.see_truth(planar_pose((pose.x, pose.y), (turn.x, turn.y, turn.z, turn.w)))
+        self.observer.see_truth(pose_on_ground((pose.x, pose.y), (turn.x, turn.y, turn.z, turn.w)))
 
     def _on_world_state(self, message: WorldState) -> None:
         self.observer.see_estimate(Pose2D(*(float(value) for value in message.robot_pose)))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tulip_description.field import load_field
-from tulip_sim.lockstep import Lockstep, Settings, robot_pose
+from tulip_sim.lockstep import Lockstep, Settings
 from tulip_sim.lockstep_recording import LockstepRecording
 from tulip_sim.scenario import make_scenario
 from tulip_sim.trial import TrialObserver, TrialSummary
@@ -53,7 +53,7 @@ def play_lockstep(
         begin = time.monotonic()
 
         def watch(now: Lockstep) -> None:
-            observer.see_truth(robot_pose(now.world.truth()))
+            observer.see_truth(now.world.truth().footprint)
             observer.see_estimate(now.world_model.state(now.stamp).robot.pose)
             if progress is not None:
                 progress(now.stamp * 1e-9, now.doing)

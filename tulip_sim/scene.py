@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tulip_description.field import Field, Goal
 from tulip_description.keeper import keeper_parts
 from tulip_description.planar import Pose2D
+from tulip_description.quaternion import quaternion_matrix
 from tulip_description.robot import Robot
 from tulip_sim.solids import Colour, View
 from tulip_sim.truth import Truth
@@ -248,7 +249,7 @@ def scene_of(truth: Truth, body: Body, keeper_colour: str) -> tuple[Scene, dict[
         keeper_colour: Of the keeper's markers.
     """
     base = np.eye(4)
-    base[:3, :3] = _rotation(truth.base_orientation)
+    base[:3, :3] = quaternion_matrix((truth.base_orientation / np.linalg.norm(truth.base_orientation)).tolist())
     base[:3, 3] = truth.base_position
     links = body.links_in_map(base, truth.joint_positions)
     boxes = body.boxes(links)
@@ -257,15 +258,3 @@ def scene_of(truth: Truth, body: Body, keeper_colour: str) -> tuple[Scene, dict[
         boxes = boxes + keeper_boxes(truth.keeper, keeper_colour)
         shadows.append((truth.keeper.x, truth.keeper.y, KEEPER_SHADOW))
     return Scene(truth.ball_position, boxes, truth.poles, tuple(shadows)), links
-
-
-def _rotation(quaternion: Array) -> Array:
-    """Return the rotation matrix of a unit quaternion x, y, z, w."""
-    x, y, z, w = (float(value) for value in quaternion / np.linalg.norm(quaternion))
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_description.quaternion import quaternion_product
 from tulip_description.robot import Foot, Robot
 from tulip_description.robot_io import Sensors
 from tulip_sim.parameters import SensorParameters
@@ -109,7 +110,9 @@ class SensorModel:
         yaw = self._yaw_rate * state.stamp * 1e-9 - self._start_yaw
         tilt = (self._attitude_bias + p.attitude_noise * noise[2 * n : 2 * n + 3]) / 2
         level = (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
-        orientation = np.array(_product(_product(level, state.base_orientation.tolist()), (*tilt.tolist(), 1.0)))
+        orientation = np.array(
+            quaternion_product(quaternion_product(level, state.base_orientation.tolist()), (*tilt.tolist(), 1.0))
+        )
         noisy_cells = state.foot_cells.ravel() + p.cell_noise * noise[2 * n + 9 :]
         return Sensors(
             stamp=state.stamp,
@@ -138,15 +141,3 @@ def _rounded(values: Array, step: float) -> Array:
         return values
     rounded: Array = np.round(values / step) * step
     return rounded
-
-
-def _product(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float, float]:
-    """Return the product of two quaternions x, y, z, w."""
-    ax, ay, az, aw = a
-    bx, by, bz, bw = b
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )

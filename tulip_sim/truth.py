@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_description.planar import Pose2D
+from tulip_description.quaternion import pose_on_ground
 
 Array = NDArray[np.float64]
 
@@ -53,3 +54,8 @@ class Truth:
     body_touches: int
     keeper_touches: int
     poles: bool
+
+    @property
+    def footprint(self) -> Pose2D:
+        """base_footprint in map: where the robot is and looks to, seen from above."""
+        return pose_on_ground(self.base_position, self.base_orientation)

@@ -206,12 +206,12 @@ def try_walk(walk: str, parameters: MotionParameters, seed: int, seconds: float)
     efforts, speeds = body.world.robot.effort_limits, body.world.robot.velocity_limits
     ticks, fastest, upright, moved = round(seconds * 1000 / TICK), 0.0, 0, np.zeros(3)
     pulse = min(LONGEST_PULSE, seconds / 2.0)
-    before = _planar(body)
+    before = body.world.truth().footprint.as_array()
     walking = 0.0
     for k in range(ticks):
         standing = walk == "start_stop" and k * TICK / 1000.0 % (2.0 * pulse) >= pulse
         body.tick(stand if standing else go)
-        now = _planar(body)
+        now = body.world.truth().footprint.as_array()
         step = now - before
         c, s = math.cos(before[2]), math.sin(before[2])
         moved += (c * step[0] + s * step[1], -s * step[0] + c * step[1], wrap_angle(step[2]))
@@ -247,10 +247,3 @@ def _figures(
         "joint_speed": fastest,
         "drift": across / length,
     }
-
-
-def _planar(body: Body) -> np.ndarray:
-    truth = body.world.truth()
-    x, y, z, w = truth.base_orientation.tolist()
-    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return np.array([truth.base_position[0], truth.base_position[1], yaw])

@@ -15,6 +15,7 @@ from tulip_description.field import Field, load_field
 from tulip_description.model import floating_model
 from tulip_description.planar import Pose2D
 from tulip_description.posture import standing_posture
+from tulip_description.quaternion import quaternion_matrix
 from tulip_description.robot import Robot, load_robot
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_sim import bodies
@@ -249,7 +250,9 @@ class World:
         client = self._client
         turn = np.array([0.0, 0.0, math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)])
         base = np.array([pose.x, pose.y, self._start_height])
-        com = base + _rotation(turn) @ self._com_in_base  # pybullet places the CoM, not the link's frame
+        com = (
+            base + quaternion_matrix(turn.tolist()) @ self._com_in_base
+        )  # pybullet places the CoM, not the link's frame
         pybullet.resetBasePositionAndOrientation(self._body, com.tolist(), turn.tolist(), physicsClientId=client)
         pybullet.resetBaseVelocity(self._body, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], physicsClientId=client)
         for index, angle in zip(self._joint_indices, self._start, strict=True):
@@ -268,7 +271,7 @@ class World:
     def _base_pose(self) -> tuple[Array, Array, Array]:
         com, orientation = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
         quaternion = np.array(orientation)
-        rotation = _rotation(quaternion)
+        rotation = quaternion_matrix(orientation)
         return np.array(com) - rotation @ self._com_in_base, quaternion, rotation
 
     def _base_velocity(self, rotation: Array) -> tuple[Array, Array]:
@@ -359,18 +362,6 @@ def _base_height(robot: Robot, joints: Array) -> float:
             " expected level soles of equal height with an upright trunk"
         )
     return -min(heights)
-
-
-def _rotation(quaternion: Array) -> Array:
-    """Return the (3, 3) rotation matrix of a unit quaternion x, y, z, w."""
-    x, y, z, w = quaternion.tolist()  # numbers of Python, which are faster one by one
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def _disconnect(client: int) -> None:

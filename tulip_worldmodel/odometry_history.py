@@ -8,6 +8,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from tulip_description.planar import Pose2D, wrap_angle
+from tulip_description.quaternion import pose_on_ground
 from tulip_motion.interface import Odometry
 
 TURN_PORTION = 0.1
@@ -50,13 +51,6 @@ class Increment:
     duration: float
 
 
-def footprint(odometry: Odometry) -> Pose2D:
-    """Return base_footprint in odom: base_link on the ground with its yaw alone."""
-    x, y, z, w = (float(value) for value in odometry.orientation)
-    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return Pose2D(float(odometry.position[0]), float(odometry.position[1]), yaw)
-
-
 def increment(earlier: PathPoint, later: PathPoint) -> Increment:
     """Return the movement from one moment to another."""
     return Increment(
@@ -82,7 +76,7 @@ class OdometryHistory:
 
     def append(self, odometry: Odometry) -> bool:
         """Add a reading; False, and no change, if it is not newer than the newest one."""
-        pose = footprint(odometry)
+        pose = pose_on_ground(odometry.position, odometry.orientation)
         distance = turned = 0.0
         if not self._points:
             self._counted = pose

@@ -26,10 +26,7 @@ def walking(ball: tuple[float, float], seed: int = 1) -> Body:
     body = Body(seed, Pose2D(-2.0, 0.0, 0.0))
     body.go(0.5)
     body.go(3.0, WALK)
-    truth = body.world.truth()
-    _, _, z, w = truth.base_orientation
-    place = Pose2D(float(truth.base_position[0]), float(truth.base_position[1]), 2.0 * math.atan2(z, w))
-    body.world.place_ball(*place.transform(ball))
+    body.world.place_ball(*body.world.truth().footprint.transform(ball))
     return body
 
 

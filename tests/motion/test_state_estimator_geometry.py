@@ -17,7 +17,7 @@ from tulip_motion.footsteps import Footstep
 from tulip_motion.interface import Side
 from tulip_motion.motion import with_fixed_head
 from tulip_motion.parameters import MotionParameters
-from tulip_motion.state_estimator import Estimate, StateEstimator, quaternion_conjugate, quaternion_product
+from tulip_motion.state_estimator import Estimate, StateEstimator
 
 ROBOT = load_robot()
 MODEL = floating_model(with_fixed_head(ROBOT))
@@ -45,15 +45,6 @@ def estimate(reading: Sensors, left_weight: float, mount: np.ndarray, anchors: t
     for side in Side:
         estimator.anchor(Footstep(side, anchors[side]))
     return estimator.update(reading, left_weight, np.zeros(3))
-
-
-@given(vectors, vectors)
-def test_quaternion_product_is_that_of_rotations(a: tuple[float, ...], b: tuple[float, ...]) -> None:
-    first, second = pin.exp3(np.array(b)), pin.exp3(np.array(a))
-    product = quaternion_product(tuple(quaternion(second).tolist()), tuple(quaternion(first).tolist()))
-    np.testing.assert_allclose(pin.Quaternion(np.array(product)).toRotationMatrix(), second @ first, atol=1e-12)
-    back = quaternion_product(product, quaternion_conjugate(product))
-    np.testing.assert_allclose(back, (0.0, 0.0, 0.0, 1.0), atol=1e-12)
 
 
 @given(vectors, vectors)

@@ -46,7 +46,7 @@ def measure(kind: KickKind, side: Side, seed: int, direction: float, told: bool)
     else:
         body.go(1.5, (0.0, 0.0, 0.0))  # the feet as a walk leaves them
         body.go(2.5)
-    base = _footprint(body)
+    base = body.world.truth().footprint
     place = _place(kind, side, direction, body, rng)
     body.world.place_ball(*base.transform(place))
     seen = place + rng.normal(0.0, SIGHT_ERROR, 2)
@@ -76,13 +76,6 @@ def measure(kind: KickKind, side: Side, seed: int, direction: float, told: bool)
         "greatest torque by limit": round(float((body.greatest_efforts / body.world.robot.effort_limits).max()), 2),
         "greatest tilt [rad]": round(body.greatest_tilt, 3),
     }
-
-
-def _footprint(body: Body) -> Pose2D:
-    truth = body.world.truth()
-    x, y, z, w = truth.base_orientation
-    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return Pose2D(float(truth.base_position[0]), float(truth.base_position[1]), yaw)
 
 
 def _place(kind: KickKind, side: Side, direction: float, body: Body, rng: np.random.Generator) -> np.ndarray:

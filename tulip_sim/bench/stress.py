@@ -8,6 +8,7 @@ import resource
 import numpy as np
 
 from tulip_description.planar import Pose2D
+from tulip_description.quaternion import pose_on_ground
 from tulip_motion.interface import KickGoal, KickKind, MotionMode, Side, WalkCommand, WalkMode
 from tulip_sim.bench.body import Body
 from tulip_sim.bench.runner import Bench, Row
@@ -58,12 +59,7 @@ class Stress:
             self.run(COMMAND, float(rng.uniform(0.5, 3.0)))
         elif kind == "go":
             odometry = self.body.motion.odometry()
-            x, y, z, w = odometry.orientation.tolist()
-            here = Pose2D(
-                float(odometry.position[0]),
-                float(odometry.position[1]),
-                math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
-            )
+            here = pose_on_ground(odometry.position, odometry.orientation)
             goal = here @ Pose2D(*rng.uniform((-0.5, -0.5, -1.5), (1.0, 0.5, 1.5)).tolist())
             self.run(WalkCommand(0, WalkMode.GO, goal=goal), 6.0)
         elif kind == "kick":

@@ -92,10 +92,8 @@ def measure(walk: str, seed: int) -> Row:
 
 
 def _pose(body: Body) -> tuple[float, float, float]:
-    truth = body.world.truth()
-    x, y, z, w = truth.base_orientation.tolist()
-    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return float(truth.base_position[0]), float(truth.base_position[1]), yaw
+    pose = body.world.truth().footprint
+    return pose.x, pose.y, pose.yaw
 
 
 def _speed(track: Array, walk: str) -> float:
