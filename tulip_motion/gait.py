@@ -124,6 +124,49 @@ class MinimumJerk:
 SHORTEST_DESCENT = 0.04  # [s] shorter, what is left of a millimetre would ask for endless jerk
 
 
+class GroundTrack:
+    """Where a swing foot is, seen from above, on its way to a landing place that may move."""
+
+    def __init__(self, start: Pose2D) -> None:
+        """Begin at rest.
+
+        Args:
+            start: Where the foot stands.
+        """
+        self._axes = (MinimumJerk(start.x), MinimumJerk(start.y), MinimumJerk(start.yaw))
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """(x, y) of the sole now, in odom [m]."""
+        return self._axes[0].position, self._axes[1].position
+
+    def advance(self, target: Pose2D, remaining: float, dt: float) -> None:
+        """Advance by dt [s] towards a target that is to be reached in `remaining` [s]; the yaw takes the short way."""
+        x, y, yaw = self._axes
+        x.advance(target.x, remaining, dt)
+        y.advance(target.y, remaining, dt)
+        yaw.advance(yaw.position + wrap_angle(target.yaw - yaw.position), remaining, dt)
+
+    def follow(self, foot: FootMotion) -> None:
+        """Take the foot to be where another path leads it."""
+        for axis, *state in zip(self._axes, foot.position, foot.velocity, foot.acceleration, strict=False):
+            axis.position, axis.velocity, axis.acceleration = map(float, state)
+        yaw = self._axes[2]
+        yaw.position, yaw.velocity, yaw.acceleration = foot.yaw, foot.yaw_rate, foot.yaw_acceleration
+
+    def at_height(self, z: float, speed: float, acceleration: float) -> FootMotion:
+        """Return the foot's reference now, with the sole's height [m], its derivative and the second one."""
+        x, y, yaw = self._axes
+        return FootMotion(
+            np.array([x.position, y.position, z]),
+            np.array([x.velocity, y.velocity, speed]),
+            np.array([x.acceleration, y.acceleration, acceleration]),
+            yaw.position,
+            yaw.velocity,
+            yaw.acceleration,
+        )
+
+
 class SwingFoot:
     """Path of the swing foot from where it stood to a landing whose place and time may still move."""
 
@@ -136,7 +179,7 @@ class SwingFoot:
             height: Greatest height of the sole [m].
             landing_speed: Speed downwards when the ground has not come at the end [m/s].
         """
-        self._axes = (MinimumJerk(start.x), MinimumJerk(start.y), MinimumJerk(start.yaw))
+        self._track = GroundTrack(start)
         self._vertical = MinimumJerk(0.0)
         self._rise_time = 0.5 * duration
         self._rises = True
@@ -147,14 +190,11 @@ class SwingFoot:
     @property
     def place(self) -> tuple[float, float]:
         """(x, y) of the sole now, in odom [m]."""
-        return self._axes[0].position, self._axes[1].position
+        return self._track.place
 
     def advance(self, target: Pose2D, remaining: float, dt: float) -> FootMotion:
         """Advance by dt [s] towards a target that is to be reached in `remaining` [s], and return the reference."""
-        x, y, yaw = self._axes
-        x.advance(target.x, remaining, dt)
-        y.advance(target.y, remaining, dt)
-        yaw.advance(yaw.position + wrap_angle(target.yaw - yaw.position), remaining, dt)
+        self._track.advance(target, remaining, dt)
         z = self._vertical
         rising = self._rise_time - self._time
         # A landing that was brought forward ends the rise, for good: coming down takes as long as going up.
@@ -171,11 +211,4 @@ class SwingFoot:
                 down -= dt
             z.advance(0.0, down, dt)
         self._time += dt
-        return FootMotion(
-            np.array([x.position, y.position, z.position]),
-            np.array([x.velocity, y.velocity, z.velocity]),
-            np.array([x.acceleration, y.acceleration, z.acceleration]),
-            yaw.position,
-            yaw.velocity,
-            yaw.acceleration,
-        )
+        return self._track.at_height(z.position, z.velocity, z.acceleration)

@@ -10,7 +10,7 @@ import numpy as np
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_description.robot import Foot
 from tulip_motion.footsteps import Footstep, plan_footsteps
-from tulip_motion.gait import FootMotion, MinimumJerk
+from tulip_motion.gait import FootMotion, GroundTrack
 from tulip_motion.interface import KickKind, Side
 from tulip_motion.kick_geometry import gap_between, striking_face
 from tulip_motion.kick_path import Quintic
@@ -236,7 +236,7 @@ class KickSwing:
         velocity = np.array([speed * math.cos(yaw), speed * math.sin(yaw), 0.0, 0.0])
         end = np.array([contact.x, contact.y, 0.0, yaw])
         self._way_to_ball: Quintic | None = Quintic(FootMotion.resting(start), end, velocity, contact_time)
-        self._axes = (MinimumJerk(start.x), MinimumJerk(start.y), MinimumJerk(start.yaw))
+        self._track = GroundTrack(start)
         self._contact_time = contact_time
         self._duration = duration
         self._height = height
@@ -246,7 +246,7 @@ class KickSwing:
     @property
     def place(self) -> tuple[float, float]:
         """(x, y) of the sole now, in odom [m]."""
-        return self._axes[0].position, self._axes[1].position
+        return self._track.place
 
     @property
     def phase(self) -> float:
@@ -265,29 +265,15 @@ class KickSwing:
             remaining: Time until then [s].
             dt: [s].
         """
-        x, y, yaw = self._axes
         if self._way_to_ball is not None and self._time + dt <= self._contact_time:
-            foot = self._way_to_ball.evaluate(self._time + dt)
-            for i, axis in enumerate((x, y)):
-                axis.position, axis.velocity = float(foot.position[i]), float(foot.velocity[i])
-                axis.acceleration = float(foot.acceleration[i])
-            yaw.position, yaw.velocity, yaw.acceleration = foot.yaw, foot.yaw_rate, foot.yaw_acceleration
+            self._track.follow(self._way_to_ball.evaluate(self._time + dt))
         else:
-            x.advance(target.x, remaining, dt)
-            y.advance(target.y, remaining, dt)
-            yaw.advance(yaw.position + wrap_angle(target.yaw - yaw.position), remaining, dt)
+            self._track.advance(target, remaining, dt)
         self._time += dt
-        z, dz, ddz = self._vertical()
-        return FootMotion(
-            np.array([x.position, y.position, z]),
-            np.array([x.velocity, y.velocity, dz]),
-            np.array([x.acceleration, y.acceleration, ddz]),
-            yaw.position,
-            yaw.velocity,
-            yaw.acceleration,
-        )
+        return self._track.at_height(*self._vertical())
 
     def _vertical(self) -> tuple[float, float, float]:
+        """Return the sole's height now [m], its derivative and the second one."""
         late = self._time - self._duration
         if late > 0.0:
             return -self._landing_speed * late, -self._landing_speed, 0.0
