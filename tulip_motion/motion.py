@@ -147,6 +147,7 @@ class Motion:
         return None if kick is None else KickProgress(not kick.finished, kick.phase, kick.reason)
 
     def _start_walking_kick(self, goal: KickGoal) -> str:
+        """Leave a kick to one of the next steps of the walk; return "" or the reason why not."""
         p = self._parameters
         if self._mode is not MotionMode.WALK or not isinstance(self._gait, Walking):
             return f"motion is in mode {self._mode.name}; a walking kick starts from WALK"
@@ -212,7 +213,7 @@ class Motion:
             self._mode,
             reference.support if reference else Support.NONE,
             reference.phase if reference else 0.0,
-            self._steps_before + (self._gait.step_count if isinstance(self._gait, Walking | PaperGait) else 0),
+            self._steps_before + self._steps_of_gait,
             estimate.com,
             tracking.com_planned if reference else np.full(3, np.nan),
             estimate.com_velocity,
@@ -237,12 +238,18 @@ class Motion:
         """Write what was learned since the last time to `learning_file`, if there is one."""
         self._tracking.save_learning()
 
+    @property
+    def _steps_of_gait(self) -> int:
+        """How many steps the walk that is under way has begun."""
+        return self._gait.step_count if isinstance(self._gait, Walking | PaperGait) else 0
+
     def _base_footprint(self) -> Pose2D:
         """Return where base_footprint is in odom."""
         position, rotation = self._estimate.base_position, self._estimate.base_rotation
         return Pose2D(float(position[0]), float(position[1]), math.atan2(rotation[1, 0], rotation[0, 0]))
 
     def _feet(self) -> tuple[Footstep, Footstep]:
+        """Return the left and right foot where they stand, in odom; one in the air where it stood last."""
         left, right = self._estimator.anchors
         return Footstep(Side.LEFT, left), Footstep(Side.RIGHT, right)
 
@@ -253,6 +260,7 @@ class Motion:
         return to_base @ left.pose, to_base @ right.pose
 
     def _middle(self) -> tuple[float, float]:
+        """Return the middle between the feet's aim points of the ZMP, where a standing robot has it, in odom [m]."""
         p = self._parameters
         left, right = (sole_point(foot, p.zmp_forward, p.zmp_inward) for foot in self._feet())
         return (left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0
@@ -265,13 +273,17 @@ class Motion:
         self._started = True
 
     def _change_mode(self, estimate: Estimate) -> None:
+        """Go over to another mode if command or body ask for it.
+
+        A robot that lies, or is limp, stands again when it is upright and nobody wants it limp. Of one that is up, a
+        fall counts most, then limpness on request, then the end of a walk or kick, then the wish to walk.
+        """
         p, wanted = self._parameters, self._command.mode
         if self._mode is MotionMode.FALLEN or self._mode is MotionMode.LIMP:
             if self._mode is MotionMode.LIMP and estimate.tilt > p.fall_tilt:
                 self._fall("fell while it was limp on request")
             elif self._may_stand(estimate) and wanted is not WalkMode.LIMP:
-                if isinstance(self._gait, Walking):
-                    self._steps_before += self._gait.step_count
+                self._steps_before += self._steps_of_gait
                 self._estimator.restart()
                 self._twist.restart()
                 self._mode, self._reason, self._gait, self._started = MotionMode.STAND, "", None, False
@@ -283,8 +295,7 @@ class Motion:
         elif wanted is WalkMode.LIMP:
             self._mode, self._reason = MotionMode.LIMP, "limp on request"
         elif self._gait is not None and self._gait.finished:
-            if isinstance(self._gait, Walking | PaperGait):
-                self._steps_before += self._gait.step_count
+            self._steps_before += self._steps_of_gait
             if isinstance(self._gait, Walking) and self._gait.kick is not None:
                 self._gait.kick.abandon("the walk has ended")
             self._gait = None
@@ -314,10 +325,12 @@ class Motion:
         return command.velocity if command.mode is WalkMode.WALK else None
 
     def _fall(self, reason: str) -> None:
+        """Go limp; how far the body rolls from now on the odometry cannot know."""
         self._mode, self._reason = MotionMode.FALLEN, reason
         self._dead_reckoning.fall()
 
     def _may_stand(self, estimate: Estimate) -> bool:
+        """Return whether the body is such that stiff legs would hold it; one that fell has to be set upright first."""
         p = self._parameters
         if self._mode is MotionMode.LIMP:
             return estimate.tilt < p.upright_tilt and min(estimate.loads) > p.contact_force
@@ -325,6 +338,7 @@ class Motion:
         return self._falls.is_upright(estimate.base_rotation, estimate.angular_velocity, height, estimate.loads)
 
     def _advance_gait(self, estimate: Estimate) -> Reference:
+        """Return what walk or kick want now, or standing where the feet are, and keep the feet that they put down."""
         dt = self._parameters.control_period
         dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
         if isinstance(self._gait, Walking):
@@ -373,6 +387,7 @@ class Motion:
                 self._estimator.anchor(foot)
 
     def _stabilize(self, estimate: Estimate, reference: Reference) -> Balance:
+        """Return the ZMP that brings the measured DCM back to the planned one, within the soles that stand."""
         # In open loop nothing is corrected: the plan's own DCM leaves the plan's ZMP.
         measured = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
         dcm = measured if reference.com is None else reference.dcm
@@ -387,6 +402,7 @@ class Motion:
         )
 
     def _send(self, order: Order) -> JointCommand:
+        """Number an order of the joints, and stamp it with the time of the sensors that it answers."""
         self._sequence += 1
         return JointCommand(
             self._sequence, self._stamp, LEG_JOINTS, order.position, order.velocity, order.effort, *order.gains

@@ -92,3 +92,21 @@ def test_a_robot_that_falls_while_limp_on_request_says_so() -> None:
         body.tick(WalkCommand(0, WalkMode.LIMP))
     assert body.motion.mode is MotionMode.FALLEN
     assert body.motion.state().reason == "fell while it was limp on request"
+
+
+@pytest.mark.parametrize("gait", ["dcm", "paper"])
+def test_steps_are_counted_on_after_a_fall(gait: str) -> None:
+    body = Body(0, START, ball=(0.0, 0.0), parameters=MotionParameters(gait=gait))
+    body.go(0.3)
+    body.go(3.0, (0.2, 0.0, 0.0))
+    body.world.push([0.0, 400.0, 0.0], 100)
+    body.go(3.0, (0.2, 0.0, 0.0))
+    assert body.motion.mode is MotionMode.FALLEN
+    before = body.motion.state().step_count
+    assert before >= 4
+    body.world.set_upright()
+    limp(body, 1.0)
+    assert body.motion.mode is MotionMode.STAND
+    assert body.motion.state().step_count == before
+    body.go(2.0, (0.2, 0.0, 0.0))
+    assert body.motion.state().step_count > before
