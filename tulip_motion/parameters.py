@@ -25,7 +25,8 @@ _tuned = _GAIT.value
 class MotionParameters:
     """Gait, balance and joint control of the legs.
 
-    Six numbers a leg follow the order hip yaw, hip roll, hip pitch, knee, ankle pitch, ankle roll.
+    A default `_tuned(NAME)` is the value of NAME in gait.yaml, which the gait tuner writes. Six numbers a leg follow
+    the order hip yaw, hip roll, hip pitch, knee, ankle pitch, ankle roll.
     """
 
     control_period: float = 0.004  # [s] one tick of the driver
@@ -64,20 +65,14 @@ class MotionParameters:
     contact_force: float = 40.0  # [N] on a sole means that it carries weight
     contact_phase: float = 0.6  # of the swing; earlier contacts are stubbed toes, not landings
     late_contact_time: float = 0.10  # [s] after the planned landing the step is taken as landed
-    placement_freeze_time: float = _tuned(
-        "placement_freeze_time"
-    )  # [s] before landing; later moves ask for endless jerk
+    placement_freeze_time: float = _tuned("placement_freeze_time")  # [s] before landing; later, jerk has no bound
     placement_gain: float = _tuned("placement_gain")  # 1 puts the foot where the DCM will be
     ankle_share: float = _tuned("ankle_share")  # of the ZMP's range that a step may count on against a disturbance
-    step_time_weight: float = _tuned(
-        "step_time_weight"
-    )  # [m^2/s^2] 0.1 s early or late costs as much as 5 mm of DCM error
+    step_time_weight: float = _tuned("step_time_weight")  # [m^2/s^2] 0.1 s early or late costs 5 mm of DCM error
     step_place_weight: float = _tuned("step_place_weight")  # [1] against the DCM error squared
     max_step_extension: float = _tuned("max_step_extension")  # [s] a step may last longer than planned
     max_step_time_rate: float = _tuned("max_step_time_rate")  # [s/s] of the landing time
-    outer_excess_weight: float = _tuned(
-        "outer_excess_weight"
-    )  # [1] DCM error beyond the landing foot: no next step catches it
+    outer_excess_weight: float = _tuned("outer_excess_weight")  # [1] DCM error beyond the landing foot, hard to catch
     max_swing_speed: float = _tuned("max_swing_speed")  # [m/s] of the foot
 
     # The paper's gait. Eq. (4) as printed is "sat" with both times 0: the foot rises at 4 m/s, and lands at 2 c'
@@ -176,15 +171,11 @@ class MotionParameters:
     learning_bound: float = 0.15  # share of a joint's torque limit that learning may use
     learning_margin: float = 1.2  # joint error by that without learning: above it learning does harm
     learning_patience: int = 3  # steps running on one foot above the margin, then it switches itself off
-    learning_top_speed: float = (
-        0.45  # [m/s] forward or back; near the gait's limit toes scuff, and learning feeds on it
-    )
+    learning_top_speed: float = 0.45  # [m/s] forward or back; faster, toes scuff, and learning feeds on it
     learning_delay: float = 0.001  # [s] joint angles are that old when they are read: the middle of 0-2 ms
     learning_gain: float = 0.5  # waveform: share of a step's feedback torque that the next steps add in advance
     learning_mirror_share: float = 0.7  # waveform: of the gain, for the other side; below 1, since legs differ
-    learning_lead: float = (
-        0.016  # [s] waveform: from the torque to its effect; two ticks are delay, two the joint's lag
-    )
+    learning_lead: float = 0.016  # [s] waveform: torque to effect; two ticks are delay, two the joint's lag
     learning_smoothing: float = 0.008  # [s] waveform: standard deviation of Q, which halves 23 Hz
     learning_beta: float = 10.0  # [s/rad] adaptive: tanh(beta e') for the sign of e'; velocity noise is 0.02 rad/s
     learning_gamma_rate: float = 50.0  # [s^2/rad^2] adaptive: Gamma_11 by K_D
