@@ -36,7 +36,9 @@ def main() -> int:
         print("== pytest", flush=True)
     if failed:
         print(f"failed before the tests: {', '.join(failed)}", flush=True)
-    code = subprocess.run([sys.executable, "-m", "pytest", *arguments], cwd=_environment.ROOT, env=variables).returncode
+    code = subprocess.run(
+        [sys.executable, "-m", "pytest", "-rs", *arguments], cwd=_environment.ROOT, env=variables
+    ).returncode
     if code == NO_TESTS:
         print("pytest ran no test", file=sys.stderr)
     return 1 if failed or code != 0 else 0
