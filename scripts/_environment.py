@@ -27,7 +27,8 @@ import sys
 import sysconfig
 import time
 from pathlib import Path
-from typing import IO, Dict, Iterator, List, NoReturn, Optional, Sequence  # noqa: UP035
+from types import TracebackType
+from typing import IO, Dict, Iterator, List, NoReturn, Optional, Sequence, Type  # noqa: UP035
 
 ROOT = Path(__file__).resolve().parent.parent
 ENVIRONMENT = ROOT / ".venv"
@@ -70,6 +71,7 @@ def prepare(extras: Sequence[str] = ()) -> None:
     Args:
         extras: Extras of the project that the script needs, as in ("test",).
     """
+    sys.excepthook = tell
     if os.environ.get("TULIP_NO_VENV"):
         return
     try:
@@ -87,6 +89,15 @@ def prepare(extras: Sequence[str] = ()) -> None:
         python = str(ENVIRONMENT / "bin" / "python")
         sys.stdout.flush()
         os.execve(python, [python, *sys.argv], clean_variables())
+
+
+def tell(kind: Type[BaseException], error: BaseException, trace: Optional[TracebackType]) -> None:  # noqa: UP006, UP045
+    """Say in one line what is wrong with gait.yaml, which is read by an import, where no script can catch it."""
+    if kind.__name__ == "GaitFileError":
+        sys.stderr.write(f"error: {error}\n")
+        sys.stderr.flush()
+        os._exit(EXIT)  # after the hook, Python would end with 1
+    sys.__excepthook__(kind, error, trace)
 
 
 def stop(message: str) -> NoReturn:

@@ -21,7 +21,12 @@ class GaitFileError(ValueError):
 
 
 class GaitFile:
-    """The values of a gait file, and which of them were asked for."""
+    """The values of a gait file, and which of them were asked for.
+
+    Attributes:
+        path: Of the file.
+        values: Its numbers by name.
+    """
 
     def __init__(self, path: Path = PATH) -> None:
         """Read a file.
@@ -29,7 +34,7 @@ class GaitFile:
         Raises:
             GaitFileError: if it cannot be read, or is not a parameter file of node motion with numbers only.
         """
-        self._path = path
+        self.path = path
         self.values = read_gait(path)
         self._asked: set[str] = set()
 
@@ -40,7 +45,7 @@ class GaitFile:
             GaitFileError: if the file does not have it.
         """
         if name not in self.values:
-            raise GaitFileError(f"{self._path} lacks {name}; expected a number for it below {NODE}: {KEY}:")
+            raise GaitFileError(f"{self.path} lacks {name}; expected a number for it below {NODE}: {KEY}:")
         self._asked.add(name)
         return self.values[name]
 
@@ -53,7 +58,7 @@ class GaitFile:
         unknown = sorted(set(self.values) - self._asked)
         if unknown:
             raise GaitFileError(
-                f"{self._path} has {', '.join(unknown)}, which motion does not take from it;"
+                f"{self.path} has {', '.join(unknown)}, which motion does not take from it;"
                 f" expected only {', '.join(sorted(self._asked))}"
             )
 

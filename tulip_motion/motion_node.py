@@ -24,6 +24,7 @@ from tulip_motion.parameters import MotionParameters
 from tulip_msgs.action import Kick
 from tulip_msgs.msg import WalkCommand as WalkCommandMessage
 from tulip_ros import topics
+from tulip_ros.errors import BadInputError
 from tulip_ros.matching import SameStamp
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.time import stamp_of
@@ -46,7 +47,10 @@ class MotionNode(ComponentNode):
         super().__init__("motion")
         self._settings = self.load(MotionParameters())
         self._kick: _RunningKick | None = None
-        self._begin()
+        try:
+            self._begin()
+        except ValueError as error:  # a number that does not fit this robot's legs
+            raise BadInputError(f"Parameters of node 'motion': {error}") from error
         self._legs = self.sender(topics.LEG_COMMAND)
         self._odometry = self.sender(topics.ODOMETRY)
         self._state = self.sender(topics.MOTION_STATE)

@@ -128,3 +128,40 @@ def test_a_look_at_a_file_leaves_it_as_it_is(tmp_path: Path) -> None:
     assert (tmp_path / "old").read_text() == "kept"
     with pytest.raises(BadInputError, match="cannot be written"):
         check_writable(tmp_path, "--json")
+
+
+def test_a_gait_file_that_cannot_be_used_is_told_in_one_line(tmp_path: Path) -> None:
+    gait = tmp_path / "gait.yaml"
+    gait.write_text("motion:\n  ros__parameters:\n    com_height: high\n")
+    code = (
+        "import _environment; _environment.prepare(); from pathlib import Path;"
+        f" from tulip_motion.gait_file import GaitFile; GaitFile(Path({str(gait)!r}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "TULIP_NO_VENV": "1"},
+        cwd=Path(match.__file__).parent,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [f"error: {gait}: com_height is 'high'; expected a finite number"]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("com_height:=2.0", "com_height is 2.0 m; expected less than "),
+        ("max_speed_forward:=0.0", "max_speed_forward is 0.0; expected > 0"),
+        ("gait:=trott", "gait is 'trott'; expected dcm or paper"),
+    ],
+)
+def test_motion_refuses_parameters_that_it_cannot_walk_with(setting: str, message: str) -> None:
+    command = [sys.executable, "-m", "tulip_motion.motion_node", "--ros-args", "-p", setting]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"error: Parameters of node 'motion': {message}")
