@@ -86,6 +86,12 @@ def sole_point(foot: Footstep, forward: float, inward: float) -> tuple[float, fl
     return foot.pose.transform((forward, -inward if foot.side is Side.LEFT else inward))
 
 
+def between_soles(feet: tuple[Footstep, Footstep], forward: float, inward: float) -> tuple[float, float]:
+    """Return the middle between the same point of both soles in odom [m]: where a standing robot has its ZMP."""
+    left, right = (sole_point(foot, forward, inward) for foot in feet)
+    return (left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0
+
+
 class MinimumJerk:
     """One coordinate steered to a target that may move, arriving at rest with minimum jerk.
 
@@ -124,7 +130,7 @@ class MinimumJerk:
 SHORTEST_DESCENT = 0.04  # [s] shorter, what is left of a millimetre would ask for endless jerk
 
 
-class GroundTrack:
+class SwingTrack:
     """Where a swing foot is, seen from above, on its way to a landing place that may move."""
 
     def __init__(self, start: Pose2D) -> None:
@@ -179,7 +185,7 @@ class SwingFoot:
             height: Greatest height of the sole [m].
             landing_speed: Speed downwards when the ground has not come at the end [m/s].
         """
-        self._track = GroundTrack(start)
+        self._track = SwingTrack(start)
         self._vertical = MinimumJerk(0.0)
         self._rise_time = 0.5 * duration
         self._rises = True

@@ -9,7 +9,7 @@ import numpy as np
 
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.footsteps import Footstep
-from tulip_motion.gait import FootMotion, Reference, sole_point, support_on
+from tulip_motion.gait import FootMotion, Reference, between_soles, sole_point, support_on
 from tulip_motion.interface import Support
 from tulip_motion.kick_path import FootPath, Move, brake
 from tulip_motion.lipm import DcmPlan, time_constant
@@ -170,8 +170,7 @@ class Kick:
         p = self._parameters
         zmp, _ = self._plan.evaluate(self._time)
         self._down_at = self._time
-        left, right = (sole_point(foot, p.zmp_forward, p.zmp_inward) for foot in self._feet)
-        middle = ((left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0)
+        middle = between_soles(self.feet, p.zmp_forward, p.zmp_inward)
         self._plan = DcmPlan([0.0, p.stop_shift_time], [zmp, middle], self._time_constant)
 
 

@@ -16,7 +16,7 @@ from tulip_description.robot_io import JointCommand, Sensors
 from tulip_motion.course import Wish, is_at, middle
 from tulip_motion.fall_detection import FallDetector
 from tulip_motion.footsteps import Footstep
-from tulip_motion.gait import FootMotion, Reference, sole_point
+from tulip_motion.gait import FootMotion, Reference, between_soles
 from tulip_motion.interface import (
     KickGoal,
     KickKind,
@@ -260,10 +260,8 @@ class Motion:
         return to_base @ left.pose, to_base @ right.pose
 
     def _middle(self) -> tuple[float, float]:
-        """Return the middle between the feet's aim points of the ZMP, where a standing robot has it, in odom [m]."""
-        p = self._parameters
-        left, right = (sole_point(foot, p.zmp_forward, p.zmp_inward) for foot in self._feet())
-        return (left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0
+        """Return where a standing robot has its ZMP, in odom [m]."""
+        return between_soles(self._feet(), self._parameters.zmp_forward, self._parameters.zmp_inward)
 
     def _start(self, estimate: Estimate) -> None:
         """Begin to stand where the robot is."""

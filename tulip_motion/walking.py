@@ -13,7 +13,7 @@ import math
 from tulip_description.planar import Pose2D
 from tulip_motion.course import Course, Wish
 from tulip_motion.footsteps import Footstep
-from tulip_motion.gait import FootMotion, Reference, SwingFoot, sole_point, support_on
+from tulip_motion.gait import FootMotion, Reference, SwingFoot, between_soles, sole_point, support_on
 from tulip_motion.interface import Side, Support
 from tulip_motion.lipm import DcmPlan, time_constant
 from tulip_motion.parameters import MotionParameters
@@ -162,8 +162,7 @@ class Walking:
         self._stance = stance
         self._time = 0.0
         self._swing = None
-        left, right = (sole_point(foot, p.zmp_forward, p.zmp_inward) for foot in self.feet)
-        middle = ((left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0)
+        middle = between_soles(self.feet, p.zmp_forward, p.zmp_inward)
         self._shift_time = self._landing_time = p.stop_shift_time
         self._swing_over = True
         self._plan = DcmPlan([0.0, p.stop_shift_time], [self._zmp, middle], self._time_constant)
@@ -247,8 +246,7 @@ class Walking:
 def must_step(parameters: MotionParameters, feet: tuple[Footstep, Footstep], dcm: tuple[float, float]) -> bool:
     """Return whether the DCM is so far from the middle between the feet that standing ankles cannot bring it back."""
     p = parameters
-    left, right = (sole_point(foot, p.zmp_forward, p.zmp_inward) for foot in feet)
-    middle = ((left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0)
+    middle = between_soles(feet, p.zmp_forward, p.zmp_inward)
     stretched = tuple(m + (d - m) / p.ankle_share for d, m in zip(dcm, middle, strict=True))
     nearest, _ = nearest_in_support(p, (stretched[0], stretched[1]), feet[0], feet[1])
     return math.hypot(stretched[0] - nearest[0], stretched[1] - nearest[1]) > 1e-9

@@ -10,7 +10,7 @@ import numpy as np
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_description.robot import Foot
 from tulip_motion.footsteps import Footstep, plan_footsteps
-from tulip_motion.gait import FootMotion, GroundTrack
+from tulip_motion.gait import FootMotion, SwingTrack
 from tulip_motion.interface import KickKind, Side
 from tulip_motion.kick_geometry import gap_between, striking_face
 from tulip_motion.kick_path import Quintic
@@ -236,7 +236,7 @@ class KickSwing:
         velocity = np.array([speed * math.cos(yaw), speed * math.sin(yaw), 0.0, 0.0])
         end = np.array([contact.x, contact.y, 0.0, yaw])
         self._way_to_ball: Quintic | None = Quintic(FootMotion.resting(start), end, velocity, contact_time)
-        self._track = GroundTrack(start)
+        self._track = SwingTrack(start)
         self._contact_time = contact_time
         self._duration = duration
         self._height = height
