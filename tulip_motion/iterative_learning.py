@@ -180,6 +180,7 @@ class WaveformLaw:
             self._teach(memory[taught], share * needed, beside)
 
     def _teach(self, waveform: Array, needed: Array, neighbour: Array | None) -> None:
+        """Add needed torque to a step's waveform, smooth it across the neighbouring steps, and bound it."""
         margin = self._margin
         raised = waveform + needed
         if neighbour is None:

@@ -167,6 +167,7 @@ class Kick:
         return rate, gain * float(lever[0] * foot.acceleration[1] - lever[1] * foot.acceleration[0])
 
     def _begin_to_stand(self) -> None:
+        """Bring the ZMP from where it is now back between the feet."""
         p = self._parameters
         zmp, _ = self._plan.evaluate(self._time)
         self._down_at = self._time

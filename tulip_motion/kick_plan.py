@@ -196,6 +196,7 @@ def _moves(
     run_up: float,
     follow_through: float,
 ) -> tuple[Move, ...]:
+    """Return lift, run-up, follow-through, return and lowering of the sole from `home` through `contact`."""
     along = np.array([math.cos(direction), math.sin(direction), 0.0, 0.0])
     ground = np.array([home.x, home.y, 0.0, home.yaw])
     over = ground + np.array([0.0, 0.0, p.kick_height, 0.0])

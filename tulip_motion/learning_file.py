@@ -134,6 +134,7 @@ def load(path: Path, owner: Mapping[str, object], shape: tuple[int, ...]) -> dic
 
 
 def _check_owner(theirs: object, ours: Mapping[str, object]) -> None:
+    """Raise LearningFileError if a file belongs to another robot, or to other parameters, and name the first."""
     if not isinstance(theirs, dict):
         raise LearningFileError("it does not say what it belongs to")
     if theirs.get("robot") != ours["robot"]:

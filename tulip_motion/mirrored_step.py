@@ -211,6 +211,7 @@ class MirroredStep:
         return [hermite(late, settling, joined, (p, 0.0, 0.0)) for p, joined in zip(resting, moving, strict=True)]
 
     def _twice(self, time: float) -> list[tuple[float, float, float]]:
+        """Return twice the CoM at a time along both axes, with its derivatives: where the foot mirrors it."""
         com = self.com(time)
         accelerations = self.com_acceleration(com)
         return [

@@ -76,6 +76,7 @@ class MotionNode(ComponentNode):
             self._kick = None
 
     def _begin(self) -> None:
+        """Make the core, and forget sensors and commands of before."""
         self._notes: set[str] = set()  # kinds of notes in the last report
         self._motion = Motion(self._settings, load_robot())
         self._sensors = SameStamp("joint_states", "imu", "foot_forces")
@@ -88,6 +89,7 @@ class MotionNode(ComponentNode):
         super().destroy_node()
 
     def _on_sensor(self, name: str, message: Any) -> None:
+        """Answer the sensors once all three messages of an instant are here."""
         complete = self._sensors.add(name, stamp_of(message), message)
         if complete is None:
             return
@@ -106,6 +108,7 @@ class MotionNode(ComponentNode):
             self._report()
 
     def _report(self) -> None:
+        """Send odometry and state, and count each new kind of note."""
         odometry, state = self._motion.odometry(), self._motion.state()
         self._odometry.publish(odometry_to_message(odometry))
         self._tf.publish(body_transforms(odometry))

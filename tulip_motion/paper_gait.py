@@ -130,6 +130,7 @@ class PaperGait:
         return self._reference()
 
     def _begin_start(self, wanted: Velocity) -> None:
+        """Rock the CoM so that it comes through the middle with the speed that the first step begins with."""
         leading = Side.LEFT if wanted[1] + wanted[2] >= 0.0 else Side.RIGHT
         stance = self._stance = self.feet[leading.other]
         trailing = self.feet[leading]
@@ -164,6 +165,7 @@ class PaperGait:
         self._part = step_between(self._shape, side, start, other, turn, target, limits)
 
     def _land(self, step: MirroredStep, wanted: Velocity | None, landed: list[Pose2D]) -> None:
+        """Take the swing foot as the stance foot, and begin the next step, or to stand."""
         side = step.side.other
         stance = self._stance = Footstep(side, landed[side])
         self.feet = (stance, self.feet[1]) if side is Side.LEFT else (self.feet[0], stance)
@@ -217,6 +219,7 @@ class PaperGait:
     def _assembled(
         self, frame: Pose2D, com: Axes, zmp: tuple[float, float], foot: FootMotion, support: Support, phase: float
     ) -> Reference:
+        """Return the reference from what is planned in the stance foot's frame."""
         assert self._stance is not None
         tc, rotation = self._shape.time_constant, frame.rotation()
         position = np.array(frame.transform((com[0].position, com[1].position)))

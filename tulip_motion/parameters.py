@@ -250,6 +250,7 @@ class MotionParameters:
                 raise ValueError(f"{field.name} is {value}; expected six numbers, hip yaw to ankle roll")
 
     def _check_learning(self) -> None:
+        """Check what learning takes, beyond the ranges of single numbers."""
         for name, low, high in (
             ("learning_bound", 0.0, 1.0),
             ("learning_gain", 0.0, 1.0),

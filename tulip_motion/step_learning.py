@@ -163,6 +163,7 @@ class StepLearner:
         return self._torque
 
     def _begin_step(self, side: Side, step: int, velocity: Velocity | None) -> None:
+        """Note which step this is, and play what was learned for it, unless it only serves as the measure without."""
         self._side, self._step, self._ticks, self._touches = side, step, 0, 0
         self._steps_seen += 1
         ordinary = velocity is not None and abs(velocity[0]) <= self._parameters.learning_top_speed

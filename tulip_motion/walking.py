@@ -109,6 +109,7 @@ class Walking:
         return self._reference(dt, dcm)
 
     def _begin_first_step(self, wish: Wish) -> None:
+        """Begin to walk with the foot on the side that the robot is to go or turn to."""
         if isinstance(wish, Pose2D):
             to_goal = self.feet[Side.LEFT].pose.inverse() @ wish
             sideways = to_goal.y + to_goal.yaw
@@ -127,6 +128,7 @@ class Walking:
         return self.feet[Side.LEFT] if abs(left) > abs(right) else self.feet[Side.RIGHT]
 
     def _begin_step(self, stance: Footstep, wish: Wish, shift_time: float) -> None:
+        """Plan footsteps and DCM from a stance foot; once the ZMP has shifted to it, the other swings."""
         p = self._parameters
         self._stance = stance
         self._time = 0.0
@@ -158,6 +160,7 @@ class Walking:
         self._adjustment = self._adjustments[stance.side]
 
     def _begin_stop(self, stance: Footstep) -> None:
+        """Bring the ZMP between the feet, which stand side by side."""
         p = self._parameters
         self._stance = stance
         self._time = 0.0
@@ -168,6 +171,7 @@ class Walking:
         self._plan = DcmPlan([0.0, p.stop_shift_time], [self._zmp, middle], self._time_constant)
 
     def _has_landed(self, loads: tuple[float, float]) -> bool:
+        """Return whether the swing foot carries weight late enough in its swing, or is overdue."""
         assert self._stance is not None
         p = self._parameters
         progress = (self._time - self._shift_time) / (self._landing_time - self._shift_time)

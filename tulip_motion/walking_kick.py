@@ -174,6 +174,7 @@ class WalkingKick:
         return self._swing
 
     def _steps(self, stance: Footstep, velocity: Velocity, pace: float, count: int) -> list[Footstep]:
+        """Return footsteps at a share of the forward speed, with the times and the width of that speed."""
         p = self._parameters
         forward = pace * velocity[0]
         return plan_footsteps(
@@ -189,6 +190,7 @@ class WalkingKick:
         return None
 
     def _reaches(self, stance: Pose2D, start: Pose2D) -> bool:
+        """Return whether the foot can swing through the ball and land, beside a stance foot and from a start."""
         p = self._parameters
         outward = 1.0 if self.side is Side.LEFT else -1.0
         contact, landing = stance.inverse() @ self._contact, stance.inverse() @ self._landing

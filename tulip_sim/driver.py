@@ -102,6 +102,7 @@ class JointDriver:
         return np.minimum(np.maximum(torque, -limit), limit)
 
     def _fault(self, command: JointCommand) -> str:
+        """Return what is wrong with a command, or ""."""
         unknown = [name for name in command.names if name not in self._index]
         if unknown or not command.names or len(set(command.names)) != len(command.names):
             what = f"unknown {', '.join(unknown)}" if unknown else f"{command.names}"
@@ -123,6 +124,7 @@ class JointDriver:
         return ""
 
     def _time_out(self, now: int) -> None:
+        """Let the groups of joints whose command has expired only damp, and after that hang loose."""
         for group in self._groups.values():
             if now >= group.next_change:
                 limp = group.expires + self._parameters.damping_time * MILLISECOND

@@ -154,6 +154,7 @@ class Lockstep:
         self.world.close()
 
     def _slow(self, stamp: int, head_positions: NDArray[np.float64]) -> None:
+        """Do what comes at 50 Hz: odometry to the world model and to the camera's pose, and the head."""
         odometry = self.motion.odometry()
         self.world_model.add_odometry(odometry)
         self._poses.add_body(stamp, float(odometry.position[2]), odometry.orientation)
@@ -183,6 +184,7 @@ class Lockstep:
             self._exposed = None
 
     def _decide(self, stamp: int) -> None:
+        """Let strategy see the world and command the legs and the head."""
         world = self.world_model.state(stamp)
         game: GameState | None = self.game_input.state(stamp)
         state: MotionState = self.motion.state()

@@ -232,6 +232,7 @@ class Referee:
         return self._preparation() - self._elapsed() if phase is GamePhase.SET else 0.0
 
     def _watch_robot(self, truth: Truth) -> None:
+        """Note since when the robot lies, and count the fall."""
         x, y, _, _ = truth.base_orientation
         upright = 1.0 - 2.0 * float(x * x + y * y)  # vertical part of the trunk's own z axis
         if math.acos(max(-1.0, min(1.0, upright))) <= self._parameters.lying_tilt:
@@ -241,6 +242,7 @@ class Referee:
             self._falls += 1
 
     def _judge(self, truth: Truth) -> None:
+        """End the trial if the rules do now."""
         lying = self._lying_since is not None and truth.stamp - self._lying_since
         if self._in_goal(truth, self._field.opponent_goal):
             self._score[0] += 1

@@ -37,6 +37,7 @@ def window(view: View, points_in_camera: Array) -> Window | None:
 
 
 def _pulled_in(view: View, points: Array) -> Array:
+    """Return points (n, 3) in the camera frame on the plane of depth 1, no farther out than the picture's edges."""
     limits = np.array([view.normals[0, 2], view.normals[2, 2]])
     depth = np.maximum(points[:, 2:], 1e-3)
     return np.concatenate([np.clip(points[:, :2] / depth, -limits, limits), np.ones((len(points), 1))], axis=1)

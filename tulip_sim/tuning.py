@@ -233,6 +233,7 @@ def _figures(
     fastest: float,
     efforts: np.ndarray,
 ) -> dict[str, float]:
+    """Return the figures by name, from the way in the robot's own axes and what was asked for while walking."""
     scale = np.array([1.0, 1.0, 0.3])  # [m/rad] makes a turning rate a speed: about that of the feet
     asked = scale * np.array(wanted) * walking
     real = scale * moved

@@ -299,6 +299,7 @@ class World:
         )
 
     def _foot_cells(self) -> Array:
+        """Return (2, 4) forces on the cells [N], from the contacts of the soles with the carpet."""
         contacts = pybullet.getContactPoints(self._body, self._carpet, physicsClientId=self._client)
         cells = np.zeros((2, 4))
         for side, link in enumerate(self._foot_links):
@@ -320,6 +321,7 @@ class World:
         return cells
 
     def _count_touches(self) -> None:
+        """Count who has come to touch the ball in this step."""
         touched = set()
         for contact in pybullet.getContactPoints(self._body, self._ball, physicsClientId=self._client):
             if contact[9] > 0.0:
