@@ -200,11 +200,13 @@ class MotionParameters:
     odometry_yaw_noise: float = 0.001  # [rad] of one heading, white: its spread while standing
     odometry_tilt_noise: float = 0.001  # [rad] of roll and pitch, white: their spread while standing
     odometry_tilt_bias: float = 0.003  # [rad] of roll and pitch, constant: spread of the mean over robots
-    odometry_step_noise: float = 0.0003  # [m] a step; soles land within 0.1 mm of where the joints say
-    odometry_forward_slip: float = 0.003  # share of the way; 0.001 was found on level carpet of friction 0.6 to 1.0
-    odometry_sideways_slip: float = 0.006  # share of the way
-    odometry_turn_slip: float = 0.001  # [m/rad] a sole that twists on the ground also shifts: 0.3 mm in 0.4 rad
-    odometry_twist_slip: float = 0.05  # [m/rad] what is left of the shift of a twisting sole, of 0.17 m/rad itself
+    odometry_step_noise: float = (
+        0.0002  # [m] a step, by maximum likelihood: the IMU's yaw over the way between the feet
+    )
+    # Most likely over 3300 steps at friction 0.6 to 1.0, fast and turning; no share of the way made them any likelier
+    odometry_twist_slip_along: float = 0.0065  # [m/rad] along the foot, left of the shift of a sole that twists
+    odometry_twist_slip_across: float = 0.035  # [m/rad] across it; the shift itself is 0.1 to 0.17 m/rad
+    odometry_flight_slip: float = 0.6  # [m/s] while the feet carry nothing: a hop of 0.02 s slid by 17 mm
     odometry_height_noise: float = 0.0005  # [m] of base_link; 0.0004 was found
     odometry_velocity_noise: float = 0.014  # [m/s] of base_link, horizontal, as found
     odometry_climb_noise: float = 0.005  # [m/s] of base_link, vertical, as found

@@ -39,6 +39,7 @@ class Estimate:
         joint_positions, joint_velocities: (12,) [rad], [rad/s].
         com, com_velocity: (3,) smoothed by the observer [m], [m/s].
         soles: (2, 4, 4) transforms of the soles.
+        sole_yaw_rates: At which the left and the right sole turn over the ground, by gyro and joints [rad/s].
         zmp: (2,) measured centre of pressure [m]; NaN without contact.
         loads: Vertical force on the left and right sole [N].
         tilt: Angle between the torso and the vertical [rad].
@@ -53,6 +54,7 @@ class Estimate:
     com: Array
     com_velocity: Array
     soles: Array
+    sole_yaw_rates: tuple[float, float]
     zmp: Array
     loads: tuple[float, float]
     tilt: float
@@ -119,7 +121,7 @@ class StateEstimator:
             soles[side] = pin.updateFramePlacement(model, data, frame).homogeneous
         if self._com is None:
             self._begin(soles)
-        position, velocity = self._from_feet(left_weight)
+        position, velocity, yaw_rates = self._from_feet(left_weight)
         x, y, z = position
         for sole, place in zip(soles, self._sole_positions, strict=True):
             px, py, pz = place.tolist()
@@ -140,6 +142,7 @@ class StateEstimator:
             com,
             com_velocity,
             soles,
+            yaw_rates,
             self._centre_of_pressure(cells, soles, loads),
             loads,
             math.acos(min(max(rotation[2, 2], -1.0), 1.0)),
@@ -170,22 +173,27 @@ class StateEstimator:
         y += share * (c * about_y - s * about_x)
         self._tilt_bias = (min(max(x, -most), most), min(max(y, -most), most))
 
-    def _from_feet(self, left_weight: float) -> tuple[Point, Point]:
-        """Return position [m] and velocity [m/s] of the base that leave the feet that carry where they stand."""
+    def _from_feet(self, left_weight: float) -> tuple[Point, Point, tuple[float, float]]:
+        """Return position [m] and velocity [m/s] of the base that leave the feet that carry where they stand.
+
+        The third is the yaw rate of both soles [rad/s].
+        """
         x = y = z = vx = vy = vz = 0.0
+        rates = [0.0, 0.0]
         for side, weight in ((Side.LEFT, left_weight), (Side.RIGHT, 1.0 - left_weight)):
+            motion = pin.getFrameVelocity(self._model, self._data, self._soles[side], pin.LOCAL_WORLD_ALIGNED)
+            rates[side] = float(motion.angular[2])
             if weight > 0.0:
                 anchor = self.anchors[side]
                 px, py, pz = self._sole_positions[side].tolist()
                 x += weight * (anchor.x - px)
                 y += weight * (anchor.y - py)
                 z -= weight * pz
-                motion = pin.getFrameVelocity(self._model, self._data, self._soles[side], pin.LOCAL_WORLD_ALIGNED)
                 wx, wy, wz = motion.linear.tolist()
                 vx -= weight * wx
                 vy -= weight * wy
                 vz -= weight * wz
-        return (x, y, z), (vx, vy, vz)
+        return (x, y, z), (vx, vy, vz), (rates[0], rates[1])
 
     def _begin(self, soles: Array) -> None:
         """Set the anchors such that the left foot stays where it was believed to be, the right beside it."""
