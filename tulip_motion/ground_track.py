@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tulip_description.planar import Pose2D, wrap_angle
+from tulip_description.planar import Pose2D
 from tulip_motion.footsteps import Footstep
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.state_estimator import Estimate
@@ -104,24 +104,23 @@ class GroundTrack:
         for side in (0, 1):
             share = 0.5 * (before[side] + self._shares[side])
             if share == 0.0:
+                self._pivots[side] = (0.0, 0.0)
                 continue
-            place_x, place_y, yaw = soles[side]
-            last_x, last_y, last_yaw = self._soles[side]
-            turned = wrap_angle(yaw - last_yaw)
-            # The pivot stays, so that base_link goes against the way that the joints show of it.
-            pivot_x, pivot_y = self._pivots[side]
-            x -= share * (place_x - last_x - turned * pivot_y)
-            y -= share * (place_y - last_y + turned * pivot_x)
+            # The pivot stays, so that base_link goes against the way that the joints show of it. Both turns are taken
+            # exactly: to first order, the IMU's noise would add up to some millimetres a minute.
+            along, across = self._pivots[side]
+            place_x, place_y, c, s = soles[side]
+            last_x, last_y, last_c, last_s = self._soles[side]
+            x -= share * (place_x - last_x + (c - last_c) * along - (s - last_s) * across)
+            y -= share * (place_y - last_y + (s - last_s) * along + (c - last_c) * across)
             rate = estimate.sole_yaw_rates[side]
             if abs(rate) > TWIST_RATE:
                 self._twist += share * abs(rate) * self._dt
             # How the sole is pressed now says how it moves until the next tick.
             self._pivots[side] = (0.0, 0.0)
             if loads[side] > self._contact_force:
-                c, s = math.cos(yaw), math.sin(yaw)
                 pushed = (-c * acceleration[0] - s * acceleration[1], s * acceleration[0] - c * acceleration[1])
-                forward, leftward = pivot(self._cells[side], cells[side].tolist(), pushed, rate)
-                self._pivots[side] = (c * forward - s * leftward, s * forward + c * leftward)
+                self._pivots[side] = pivot(self._cells[side], cells[side].tolist(), pushed, rate)
         self.position, self._soles = (x, y), soles
 
     def _counted(self, loads: tuple[float, float]) -> tuple[float, float] | None:
@@ -203,10 +202,11 @@ def _yaw(estimate: Estimate, side: int) -> float:
     return math.atan2(sole[1, 0], sole[0, 0])
 
 
-def _soles(estimate: Estimate) -> list[tuple[float, float, float]]:
-    """Return x, y [m] of the left and the right sole from base_link, along the axes of odom, and yaw [rad]."""
+def _soles(estimate: Estimate) -> list[tuple[float, float, float, float]]:
+    """Return x, y [m] of the left and the right sole from base_link, along the axes of odom, cos and sin of its yaw."""
     base_x, base_y, _ = estimate.base_position.tolist()
     soles = []
     for (forward_x, _, _, x), (forward_y, _, _, y) in estimate.soles[:, :2].tolist():
-        soles.append((x - base_x, y - base_y, math.atan2(forward_y, forward_x)))
+        length = math.hypot(forward_x, forward_y)
+        soles.append((x - base_x, y - base_y, forward_x / length, forward_y / length))
     return soles

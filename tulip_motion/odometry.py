@@ -50,6 +50,7 @@ class DeadReckoning:
         self._stamp: int | None = None
         self._position: Point = (0.0, 0.0)
         self._signs = SlipSigns(0.0, 0.0)
+        self._bent: Point = (0.0, 0.0)  # [m rad^2] sum of the way, each part by the variance of the heading
         self._unknown_tilt = 1.0  # share of the IMU's tilt error that the soles have not told yet
         # odom lies where the robot stood when it was switched on, turned by the error of the first reading
         self._covariance = np.diag([0.0, 0.0, p.odometry_yaw_noise**2, p.odometry_yaw_drift**2])
@@ -82,6 +83,7 @@ class DeadReckoning:
         if self._stamp is not None:
             step_time = min(1e-9 * (stamp - self._stamp), LONGEST_STEP)
             self._unknown_tilt *= math.exp(-max(step_time - p.double_support_time, 0.0) / p.imu_bias_time)
+        self._bent = self._bent_until(position)
         self._stamp, self._position, self._signs = stamp, position, signs
 
     def fall(self) -> None:
@@ -103,7 +105,8 @@ class DeadReckoning:
         """
         p = self._parameters
         planar = self._extrapolated(stamp, (float(position[0]), float(position[1])))[:3, :3]
-        planar[:2, :2] += self._slip(signs, yaw)
+        bent = self._bent_until((float(position[0]), float(position[1])))
+        planar[:2, :2] += self._slip(signs, yaw) + 0.75 * np.outer(bent, bent)
         # |k R(yaw) b - b|^2 of a lean b of which a share k is still unknown: that turns with the body, the whole of it
         # put the start off; and the white noise of now and of the start
         unknown = self._unknown_tilt
@@ -112,11 +115,15 @@ class DeadReckoning:
         planar[0, 0] += lean * position[2] ** 2
         planar[1, 1] += lean * position[2] ** 2
         planar[YAW, YAW] += p.odometry_yaw_noise**2
-        tilt = p.odometry_tilt_bias**2 + p.odometry_tilt_noise**2
+        tilt = (unknown * p.odometry_tilt_bias) ** 2 + p.odometry_tilt_noise**2
         height = p.odometry_fall_spread if lying else p.odometry_height_noise
         covariance = np.diag([0.0, 0.0, height**2, tilt, tilt, 0.0])
         covariance[PLANE] = planar
         return covariance
+
+    def _bent_until(self, position: Point) -> Point:
+        variance, last = float(self._covariance[YAW, YAW]), self._position
+        return self._bent[0] + variance * (position[0] - last[0]), self._bent[1] + variance * (position[1] - last[1])
 
     def _slip(self, signs: SlipSigns, yaw: float) -> Array:
         """Return the (2, 2) covariance [m^2] of what slipped since the last step, of a foot with this yaw [rad]."""

@@ -89,6 +89,29 @@ def test_a_slip_counts_at_once_and_only_once() -> None:
     )
 
 
+def test_roll_and_pitch_grow_surer_while_the_tilt_is_learned() -> None:
+    reckoning, feet = begun(), [Pose2D(0.0, 0.12), Pose2D(0.0, -0.12)]
+    tilts = []
+    for step in range(60):
+        reckoning.step(round(0.4 * step * SECOND), (0.0, 0.0), feet, feet, NO_SLIP)
+        tilts.append(reckoning.pose_covariance(round(0.4 * step * SECOND), base(0, 0), 0.0, NO_SLIP)[3, 3])
+    assert tilts[0] == pytest.approx(P.odometry_tilt_bias**2 + P.odometry_tilt_noise**2)
+    assert np.all(np.diff(tilts) <= 0.0)
+    assert tilts[-1] == pytest.approx(P.odometry_tilt_noise**2, rel=0.01)
+
+
+def test_a_heading_that_is_off_shortens_the_way() -> None:
+    """Monte Carlo over drifts of six minutes straight on, when the shortening is more than all slips."""
+    drift = np.random.default_rng(2).normal(0.0, P.odometry_yaw_drift, 20000)
+    reckoning, x, truth, feet = begun(), 0.0, np.zeros(20000), [Pose2D(), Pose2D()]
+    for step in range(1, 361):
+        x += 0.5
+        truth += 0.5 * np.cos(drift * (step - 0.5))
+        reckoning.step(step * SECOND, (x, 0.0), feet, feet, NO_SLIP)
+    said = reckoning.pose_covariance(360 * SECOND, base(x, 0.0), 0.0, NO_SLIP)
+    assert said[0, 0] == pytest.approx(np.mean((truth - x) ** 2), rel=0.1)  # white noise and higher orders
+
+
 @given(
     steps=st.lists(
         st.tuples(
