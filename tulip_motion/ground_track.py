@@ -82,7 +82,7 @@ class GroundTrack:
     def begin(self, estimate: Estimate, position: Point) -> None:
         """Take base_link to be at a place in odom [m], with the feet as they are."""
         self.position = position
-        self._soles = _soles(estimate)
+        self._soles, self._base = _seen_from_above(estimate)
         self._shares = self._counted(estimate.loads) or (0.5, 0.5)
         self._pivots = [(0.0, 0.0), (0.0, 0.0)]
 
@@ -94,7 +94,9 @@ class GroundTrack:
             cells: (2, 4) forces on the left and the right foot [N].
             acceleration: Of the CoM along the ground, in odom [m/s^2].
         """
-        loads, before, soles = estimate.loads, self._shares, _soles(estimate)
+        loads, before = estimate.loads, self._shares
+        soles, base = _seen_from_above(estimate)
+        base_way_x, base_way_y = base[0] - self._base[0], base[1] - self._base[1]
         counted = self._counted(loads)
         if counted is None:
             self._flight += self._dt
@@ -106,22 +108,25 @@ class GroundTrack:
             if share == 0.0:
                 self._pivots[side] = (0.0, 0.0)
                 continue
-            # The pivot stays, so that base_link goes against the way that the joints show of it. Both turns are taken
-            # exactly: to first order, the IMU's noise would add up to some millimetres a minute.
+            # The pivot stays, so that base_link goes against the way that the joints show of it. The sole's axes are
+            # taken as they are: to first order in their turn, the IMU's noise would add up to millimetres a minute.
             along, across = self._pivots[side]
-            place_x, place_y, c, s = soles[side]
-            last_x, last_y, last_c, last_s = self._soles[side]
-            x -= share * (place_x - last_x + (c - last_c) * along - (s - last_s) * across)
-            y -= share * (place_y - last_y + (s - last_s) * along + (c - last_c) * across)
+            (forward_x, left_x, _, place_x), (forward_y, left_y, _, place_y) = soles[side]
+            (last_forward_x, last_left_x, _, last_x), (last_forward_y, last_left_y, _, last_y) = self._soles[side]
+            way_x = place_x - last_x + (forward_x - last_forward_x) * along + (left_x - last_left_x) * across
+            way_y = place_y - last_y + (forward_y - last_forward_y) * along + (left_y - last_left_y) * across
+            x -= share * (way_x - base_way_x)
+            y -= share * (way_y - base_way_y)
             rate = estimate.sole_yaw_rates[side]
             if abs(rate) > TWIST_RATE:
                 self._twist += share * abs(rate) * self._dt
             # How the sole is pressed now says how it moves until the next tick.
             self._pivots[side] = (0.0, 0.0)
             if loads[side] > self._contact_force:
-                pushed = (-c * acceleration[0] - s * acceleration[1], s * acceleration[0] - c * acceleration[1])
+                ax, ay = acceleration
+                pushed = (-forward_x * ax - forward_y * ay, -left_x * ax - left_y * ay)
                 self._pivots[side] = pivot(self._cells[side], cells[side].tolist(), pushed, rate)
-        self.position, self._soles = (x, y), soles
+        self.position, self._soles, self._base = (x, y), soles, base
 
     def _counted(self, loads: tuple[float, float]) -> tuple[float, float] | None:
         """Return how much the left and the right foot count by their loads [N]; None if they carry nothing."""
@@ -202,11 +207,8 @@ def _yaw(estimate: Estimate, side: int) -> float:
     return math.atan2(sole[1, 0], sole[0, 0])
 
 
-def _soles(estimate: Estimate) -> list[tuple[float, float, float, float]]:
-    """Return x, y [m] of the left and the right sole from base_link, along the axes of odom, cos and sin of its yaw."""
-    base_x, base_y, _ = estimate.base_position.tolist()
-    soles = []
-    for (forward_x, _, _, x), (forward_y, _, _, y) in estimate.soles[:, :2].tolist():
-        length = math.hypot(forward_x, forward_y)
-        soles.append((x - base_x, y - base_y, forward_x / length, forward_y / length))
-    return soles
+def _seen_from_above(estimate: Estimate) -> tuple[list[list[list[float]]], Point]:
+    """Return the upper two rows of the transforms of both soles, and (x, y) of base_link [m]."""
+    x, y, _ = estimate.base_position.tolist()
+    soles: list[list[list[float]]] = estimate.soles[:, :2].tolist()
+    return soles, (x, y)
