@@ -17,6 +17,7 @@ from tulip_motion.course import Wish, is_at, middle
 from tulip_motion.fall_detection import FallDetector
 from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import FootMotion, Reference, between_soles
+from tulip_motion.ground_track import GroundTrack, carried
 from tulip_motion.interface import (
     KickGoal,
     KickKind,
@@ -33,7 +34,7 @@ from tulip_motion.inverse_kinematics import rotation_z
 from tulip_motion.kick import Kick, moved
 from tulip_motion.kick_plan import expected_ball, plan_kick, refused_numbers
 from tulip_motion.lipm import time_constant
-from tulip_motion.odometry import DeadReckoning, StanceTwist
+from tulip_motion.odometry import DeadReckoning
 from tulip_motion.paper_gait import PaperGait
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import reach
@@ -77,7 +78,8 @@ class Motion:
         self._stamp = 0
         self._left_weight = 0.5
         self._dead_reckoning = DeadReckoning(p)
-        self._twist = StanceTwist(p.control_period)
+        self._ground = GroundTrack(p, [foot.cells for foot in robot.feet])
+        self._shift = (0.0, 0.0)  # [m] of base_link in odom by slips since the feet were last put where they are
         self._falls = FallDetector(p)
 
     @property
@@ -168,6 +170,7 @@ class Motion:
         """Return the command for the legs that answers one reading of the sensors."""
         self._stamp = sensors.stamp
         estimate = self._estimate = self._estimator.update(sensors, self._left_weight, self._tracking.com_acceleration)
+        self._track_ground(estimate, sensors)
         if not self._started:
             self._start(estimate)
         self._change_mode(estimate)
@@ -188,15 +191,16 @@ class Motion:
         """Return dead reckoning as of the last tick."""
         estimate = self._estimate
         yaw = math.atan2(estimate.base_rotation[1, 0], estimate.base_rotation[0, 0])
+        position = np.array([*self._ground.position, estimate.base_position[2]])
         return Odometry(
             self._stamp,
-            estimate.base_position.copy(),
+            position,
             pin.Quaternion(estimate.base_rotation).coeffs(),
             rotation_z(-yaw) @ estimate.base_velocity,
             estimate.base_rotation.T @ estimate.angular_velocity,
             self._dead_reckoning.distance,
             self._dead_reckoning.pose_covariance(
-                self._stamp, estimate.base_position, yaw, self._mode is MotionMode.FALLEN
+                self._stamp, position, yaw, self._ground.signs, self._mode is MotionMode.FALLEN
             ),
             self._dead_reckoning.twist_covariance(),
         )
@@ -263,11 +267,21 @@ class Motion:
         """Return where a standing robot has its ZMP, in odom [m]."""
         return between_soles(self._feet(), self._parameters.zmp_forward, self._parameters.zmp_inward)
 
+    def _track_ground(self, estimate: Estimate, sensors: Sensors) -> None:
+        """Follow base_link over the ground. A robot that lies or sinks is taken to stay where its feet are."""
+        x, y = float(estimate.base_position[0]), float(estimate.base_position[1])
+        if self._started and self._mode not in (MotionMode.LIMP, MotionMode.FALLEN):
+            ax, ay, _ = self._tracking.com_acceleration.tolist()
+            self._ground.update(estimate, sensors.foot_cells, (ax, ay))
+        else:
+            self._ground.begin(estimate, (x + self._shift[0], y + self._shift[1]))
+        self._shift = (self._ground.position[0] - x, self._ground.position[1] - y)
+
     def _start(self, estimate: Estimate) -> None:
         """Begin to stand where the robot is."""
         self._tracking.reset(estimate)
         self._left_weight = 0.5
-        self._dead_reckoning.begin(self._stamp, estimate.base_position[:2])
+        self._dead_reckoning.begin(self._stamp, self._ground.position)
         self._started = True
 
     def _change_mode(self, estimate: Estimate) -> None:
@@ -283,7 +297,6 @@ class Motion:
             elif self._may_stand(estimate) and wanted is not WalkMode.LIMP:
                 self._steps_before += self._steps_of_gait
                 self._estimator.restart()
-                self._twist.restart()
                 self._mode, self._reason, self._gait, self._started = MotionMode.STAND, "", None, False
             return
         dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
@@ -319,7 +332,9 @@ class Motion:
         """Return what the present command asks of the walk."""
         command = self._command
         if command.mode is WalkMode.GO:
-            return command.goal
+            # The feet follow the slips that odometry has seen only when one lands.
+            goal, (x, y) = command.goal, self._shift
+            return Pose2D(goal.x - x, goal.y - y, goal.yaw)
         return command.velocity if command.mode is WalkMode.WALK else None
 
     def _fall(self, reason: str) -> None:
@@ -340,16 +355,12 @@ class Motion:
         dt = self._parameters.control_period
         dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
         if isinstance(self._gait, Walking):
-            shift_x, shift_y = self._twist.shift
+            shift_x, shift_y = self._shift
             landed = [Pose2D(at.x + shift_x, at.y + shift_y, at.yaw) for at in map(planar_pose, estimate.soles)]
             before = self._gait.feet
             reference = self._gait.tick(dt, self._wish(), (dcm[0], dcm[1]), landed, estimate.loads)
-            self._gait.feet = self._twist.carried(before, self._gait.feet)
+            self._gait.feet = carried(before, self._gait.feet, self._shift, estimate)
             self._anchor(self._gait.feet)
-            if reference.support is not Support.DOUBLE:
-                side = reference.stance.side
-                yaw = planar_pose(estimate.soles[side]).yaw
-                self._twist.update(self._estimator.anchors[side], yaw, estimate.zmp)
             return reference
         if isinstance(self._gait, PaperGait):
             landed = [planar_pose(sole) for sole in estimate.soles]
@@ -378,9 +389,9 @@ class Motion:
         """Tell the estimator where the feet stand, and count the way."""
         before = self._estimator.anchors
         if (feet[0].pose, feet[1].pose) != tuple(before):
-            position = self._estimate.base_position[:2]
-            self._dead_reckoning.step(self._stamp, position, before, [foot.pose for foot in feet], self._twist.twist)
-            self._twist.restart()
+            self._dead_reckoning.step(
+                self._stamp, self._ground.position, before, [foot.pose for foot in feet], self._ground.signs
+            )
             for foot in feet:
                 self._estimator.anchor(foot)
 

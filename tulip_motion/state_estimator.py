@@ -38,6 +38,7 @@ class Estimate:
         joint_positions, joint_velocities: (12,) [rad], [rad/s].
         com, com_velocity: (3,) smoothed by the observer [m], [m/s].
         soles: (2, 4, 4) transforms of the soles.
+        sole_yaw_rates: At which the left and the right sole turn, by gyro and joints [rad/s]; 0 in the air.
         zmp: (2,) measured centre of pressure [m]; NaN without contact.
         loads: Vertical force on the left and right sole [N].
         tilt: Angle between the torso and the vertical [rad].
@@ -52,6 +53,7 @@ class Estimate:
     com: Array
     com_velocity: Array
     soles: Array
+    sole_yaw_rates: tuple[float, float]
     zmp: Array
     loads: tuple[float, float]
     tilt: float
@@ -118,14 +120,14 @@ class StateEstimator:
             soles[side] = pin.updateFramePlacement(model, data, frame).homogeneous
         if self._com is None:
             self._begin(soles)
-        position, velocity = self._from_feet(left_weight)
+        cells = sensors.foot_cells
+        loads = (sum(cells[0].tolist()), sum(cells[1].tolist()))
+        position, velocity, yaw_rates = self._from_feet(left_weight, loads)
         x, y, z = position
         for sole, place in zip(soles, self._sole_positions, strict=True):
             px, py, pz = place.tolist()
             sole[:3, 3] = (px + x, py + y, pz + z)
         rotation = self._base_rotation.copy()
-        cells = sensors.foot_cells
-        loads = (sum(cells[0].tolist()), sum(cells[1].tolist()))
         if left_weight in (0.0, 1.0):
             self._learn_tilt_bias(soles[Side.LEFT if left_weight == 1.0 else Side.RIGHT], rotation)
         com, com_velocity = self._observe(position, velocity, acceleration)
@@ -139,6 +141,7 @@ class StateEstimator:
             com,
             com_velocity,
             soles,
+            yaw_rates,
             self._centre_of_pressure(cells, soles, loads),
             loads,
             math.acos(min(max(rotation[2, 2], -1.0), 1.0)),
@@ -169,22 +172,27 @@ class StateEstimator:
         y += share * (c * about_y - s * about_x)
         self._tilt_bias = (min(max(x, -most), most), min(max(y, -most), most))
 
-    def _from_feet(self, left_weight: float) -> tuple[Point, Point]:
-        """Return position [m] and velocity [m/s] of the base that leave the feet that carry where they stand."""
+    def _from_feet(self, left_weight: float, loads: tuple[float, float]) -> tuple[Point, Point, tuple[float, float]]:
+        """Return position [m] and velocity [m/s] of the base that leave the feet that carry where they stand.
+
+        The third is the yaw rate of the soles [rad/s], 0 of one in the air.
+        """
         x = y = z = vx = vy = vz = 0.0
+        rates = [0.0, 0.0]
         for side, weight in ((Side.LEFT, left_weight), (Side.RIGHT, 1.0 - left_weight)):
-            if weight > 0.0:
-                anchor = self.anchors[side]
-                px, py, pz = self._sole_positions[side].tolist()
-                x += weight * (anchor.x - px)
-                y += weight * (anchor.y - py)
-                z -= weight * pz
-                motion = pin.getFrameVelocity(self._model, self._data, self._soles[side], pin.LOCAL_WORLD_ALIGNED)
-                wx, wy, wz = motion.linear.tolist()
-                vx -= weight * wx
-                vy -= weight * wy
-                vz -= weight * wz
-        return (x, y, z), (vx, vy, vz)
+            if weight == 0.0 and loads[side] < self._parameters.contact_force:
+                continue
+            motion = pin.getFrameVelocity(self._model, self._data, self._soles[side], pin.LOCAL_WORLD_ALIGNED)
+            wx, wy, wz, _, _, rates[side] = motion.vector.tolist()
+            anchor = self.anchors[side]
+            px, py, pz = self._sole_positions[side].tolist()
+            x += weight * (anchor.x - px)
+            y += weight * (anchor.y - py)
+            z -= weight * pz
+            vx -= weight * wx
+            vy -= weight * wy
+            vz -= weight * wz
+        return (x, y, z), (vx, vy, vz), (rates[0], rates[1])
 
     def _begin(self, soles: Array) -> None:
         """Set the anchors such that the left foot stays where it was believed to be, the right beside it."""
@@ -240,7 +248,8 @@ class StateEstimator:
 
 def planar_pose(transform: Array) -> Pose2D:
     """Return where a (4, 4) transform lies on the ground, with its yaw."""
-    return Pose2D(float(transform[0, 3]), float(transform[1, 3]), math.atan2(transform[1, 0], transform[0, 0]))
+    (c, _, _, x), (s, _, _, y) = transform[:2].tolist()
+    return Pose2D(x, y, math.atan2(s, c))
 
 
 def keep_distance(anchor: Pose2D, measured: Pose2D, other: Pose2D) -> Pose2D:

@@ -10,20 +10,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tulip_description.planar import Pose2D
-from tulip_motion.footsteps import Footstep
-from tulip_motion.interface import Side
-from tulip_motion.odometry import DeadReckoning, StanceTwist
+from tulip_motion.ground_track import SlipSigns
+from tulip_motion.odometry import DeadReckoning
 from tulip_motion.parameters import MotionParameters
 from tulip_sim.bench import odometry as bench
 
 P = MotionParameters()
 SECOND = 1_000_000_000
 HEIGHT = 1.05
+NO_SLIP = SlipSigns(0.0, 0.0)
 
 
 def begun() -> DeadReckoning:
     reckoning = DeadReckoning(P)
-    reckoning.begin(0, np.zeros(2))
+    reckoning.begin(0, (0.0, 0.0))
     return reckoning
 
 
@@ -33,7 +33,7 @@ def base(x: float, y: float) -> np.ndarray:
 
 def test_heading_variance_grows_with_the_square_of_time_by_the_drift() -> None:
     reckoning = begun()
-    short, long = (reckoning.pose_covariance(t * SECOND, base(0, 0), 0.0)[5, 5] for t in (100, 200))
+    short, long = (reckoning.pose_covariance(t * SECOND, base(0, 0), 0.0, NO_SLIP)[5, 5] for t in (100, 200))
     white = 2.0 * P.odometry_yaw_noise**2
     walk = P.odometry_yaw_walk**2 * 100
     assert short - white == pytest.approx(P.odometry_yaw_drift**2 * 100**2 + walk, rel=1e-9)
@@ -43,7 +43,7 @@ def test_heading_variance_grows_with_the_square_of_time_by_the_drift() -> None:
 def test_covariance_is_that_of_walks_with_random_drift_and_slip() -> None:
     """Monte Carlo of the same model, carried out on poses instead of linearized: 2000 walks round a corner."""
     rng = np.random.default_rng(1)
-    runs, dt = 2000, 2.0
+    runs, dt, twist, flight = 2000, 2.0, 0.2, 0.004
     ways = [(0.3, 0.0)] * 20 + [(0.0, 0.3)] * 20
     reckoning = begun()
     x = np.zeros(2)
@@ -54,16 +54,17 @@ def test_covariance_is_that_of_walks_with_random_drift_and_slip() -> None:
         heading = 0.0 if k < 20 else math.pi / 2
         before = Pose2D(*x, heading)
         x = x + way
+        signs = SlipSigns((k + 1) * twist, (k + 1) * flight)
         # the base moves by way when both feet do
-        reckoning.step(round((k + 1) * dt * SECOND), x, [before, before], [Pose2D(*x, heading)] * 2)
+        reckoning.step(round((k + 1) * dt * SECOND), (x[0], x[1]), [before, before], [Pose2D(*x, heading)] * 2, signs)
         middle = yaw + drift * dt / 2.0
         turned = np.column_stack([np.cos(middle) * way[0] - np.sin(middle) * way[1], 0 * middle])
         turned[:, 1] = np.sin(middle) * way[0] + np.cos(middle) * way[1]
-        slip = rng.normal(0.0, (P.odometry_forward_slip * 0.3, 0.0), (runs, 2))
-        slip += rng.normal(0.0, P.odometry_step_noise, (runs, 2))
+        slip = rng.normal(0.0, (P.odometry_twist_slip_along * twist, P.odometry_twist_slip_across * twist), (runs, 2))
+        slip += rng.normal(0.0, math.hypot(P.odometry_step_noise, P.odometry_flight_slip * flight), (runs, 2))
         errors += turned - way + (slip if k < 20 else slip[:, ::-1])
         yaw += drift * dt + rng.normal(0.0, P.odometry_yaw_walk * math.sqrt(dt), runs)
-    said = reckoning.pose_covariance(80 * SECOND, base(*x), 0.0)
+    said = reckoning.pose_covariance(80 * SECOND, base(*x), 0.0, SlipSigns(40 * twist, 40 * flight))
     floor = 2.0 * (P.odometry_tilt_noise * HEIGHT) ** 2
     sample = np.cov(np.column_stack([errors, yaw]).T)
     expected = said[np.ix_((0, 1, 5), (0, 1, 5))] - np.diag([floor, floor, P.odometry_yaw_noise**2])
@@ -72,21 +73,66 @@ def test_covariance_is_that_of_walks_with_random_drift_and_slip() -> None:
     np.testing.assert_allclose(expected / scale, sample / scale, atol=0.12)  # 4 sigma of a variance of 2000 samples
 
 
+def test_a_slip_counts_at_once_and_only_once() -> None:
+    reckoning, signs = begun(), SlipSigns(0.1, 0.0)
+    quiet = reckoning.pose_covariance(0, base(0, 0), 0.0, NO_SLIP)
+    during = reckoning.pose_covariance(0, base(0, 0), math.pi / 2, signs)
+    across, along = during[0, 0] - quiet[0, 0], during[1, 1] - quiet[1, 1]
+    tilt = 2.0 * (P.odometry_tilt_bias * HEIGHT) ** 2  # of the quarter turn, between two of a lean of unknown direction
+    assert across - tilt == pytest.approx((0.1 * P.odometry_twist_slip_across) ** 2, rel=1e-6)
+    assert along - tilt == pytest.approx((0.1 * P.odometry_twist_slip_along) ** 2, rel=1e-6)
+    left, right = Pose2D(0.0, 0.12), Pose2D(0.0, -0.12)
+    reckoning.step(0, (0.0, 0.0), [left, right], [left, right], signs)
+    after = reckoning.pose_covariance(0, base(0, 0), 0.0, signs)
+    assert after[1, 1] - quiet[1, 1] == pytest.approx(
+        (0.1 * P.odometry_twist_slip_across) ** 2 + P.odometry_step_noise**2
+    )
+
+
+def test_roll_and_pitch_grow_surer_while_the_tilt_is_learned() -> None:
+    reckoning, feet = begun(), [Pose2D(0.0, 0.12), Pose2D(0.0, -0.12)]
+    tilts = []
+    for step in range(60):
+        reckoning.step(round(0.4 * step * SECOND), (0.0, 0.0), feet, feet, NO_SLIP)
+        tilts.append(reckoning.pose_covariance(round(0.4 * step * SECOND), base(0, 0), 0.0, NO_SLIP)[3, 3])
+    assert tilts[0] == pytest.approx(P.odometry_tilt_bias**2 + P.odometry_tilt_noise**2)
+    assert np.all(np.diff(tilts) <= 0.0)
+    assert tilts[-1] == pytest.approx(P.odometry_tilt_noise**2, rel=0.01)
+
+
+def test_a_heading_that_is_off_shortens_the_way() -> None:
+    """Monte Carlo over drifts of six minutes straight on, when the shortening is more than all slips."""
+    drift = np.random.default_rng(2).normal(0.0, P.odometry_yaw_drift, 20000)
+    reckoning, x, truth, feet = begun(), 0.0, np.zeros(20000), [Pose2D(), Pose2D()]
+    for step in range(1, 361):
+        x += 0.5
+        truth += 0.5 * np.cos(drift * (step - 0.5))
+        reckoning.step(step * SECOND, (x, 0.0), feet, feet, NO_SLIP)
+    said = reckoning.pose_covariance(360 * SECOND, base(x, 0.0), 0.0, NO_SLIP)
+    assert said[0, 0] == pytest.approx(np.mean((truth - x) ** 2), rel=0.1)  # white noise and higher orders
+
+
 @given(
     steps=st.lists(
-        st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.floats(-0.6, 0.6), st.integers(1, 10**10)),
+        st.tuples(
+            st.floats(-0.4, 0.4),
+            st.floats(-0.4, 0.4),
+            st.floats(-0.6, 0.6),
+            st.integers(1, 10**10),
+            st.floats(0.0, 0.5),
+        ),
         max_size=30,
     ),
     lying=st.booleans(),
 )
 def test_covariance_is_symmetric_positive_definite_and_never_shrinks_in_the_plane(
-    steps: list[tuple[float, float, float, int]], lying: bool
+    steps: list[tuple[float, float, float, int, float]], lying: bool
 ) -> None:
-    reckoning, pose, stamp = begun(), Pose2D(), 0
-    for dx, dy, turn, wait in steps:
-        before, pose, stamp = pose, pose @ Pose2D(dx, dy, turn), stamp + wait
-        reckoning.step(stamp, np.array([pose.x, pose.y]), [before, before], [pose, before])
-    covariance = reckoning.pose_covariance(stamp, base(pose.x, pose.y), pose.yaw, lying)
+    reckoning, pose, stamp, twist = begun(), Pose2D(), 0, 0.0
+    for dx, dy, turn, wait, more in steps:
+        before, pose, stamp, twist = pose, pose @ Pose2D(dx, dy, turn), stamp + wait, twist + more
+        reckoning.step(stamp, (pose.x, pose.y), [before, before], [pose, before], SlipSigns(twist, 0.0))
+    covariance = reckoning.pose_covariance(stamp, base(pose.x, pose.y), pose.yaw, SlipSigns(twist, 0.1), lying)
     np.testing.assert_allclose(covariance, covariance.T, rtol=1e-9, atol=1e-18)
     assert np.linalg.eigvalsh(covariance).min() > 0.0
     assert covariance[5, 5] >= P.odometry_yaw_noise**2
@@ -95,45 +141,19 @@ def test_covariance_is_symmetric_positive_definite_and_never_shrinks_in_the_plan
 def test_distance_is_the_way_of_the_point_between_the_feet() -> None:
     reckoning = begun()
     left, right = Pose2D(0.0, 0.12), Pose2D(0.0, -0.12)
-    reckoning.step(SECOND, np.zeros(2), [left, right], [Pose2D(0.4, 0.12), right])
-    reckoning.step(2 * SECOND, np.zeros(2), [left, right], [left, Pose2D(-0.2, -0.12)])
+    reckoning.step(SECOND, (0.0, 0.0), [left, right], [Pose2D(0.4, 0.12), right], NO_SLIP)
+    reckoning.step(2 * SECOND, (0.0, 0.0), [left, right], [left, Pose2D(-0.2, -0.12)], NO_SLIP)
     assert reckoning.distance == pytest.approx(0.3)
 
 
 def test_a_fall_makes_the_place_unsure_but_not_the_heading() -> None:
     reckoning = begun()
-    before = reckoning.pose_covariance(SECOND, base(0, 0), 0.3)
+    before = reckoning.pose_covariance(SECOND, base(0, 0), 0.3, NO_SLIP)
     reckoning.fall()
-    after = reckoning.pose_covariance(SECOND, base(0, 0), 0.3, lying=True)
+    after = reckoning.pose_covariance(SECOND, base(0, 0), 0.3, NO_SLIP, lying=True)
     assert after[0, 0] - before[0, 0] == pytest.approx(P.odometry_fall_spread**2)
     assert after[5, 5] == before[5, 5]
     assert after[2, 2] == P.odometry_fall_spread**2
-
-
-def test_a_twisting_sole_pivots_about_its_centre_of_pressure() -> None:
-    twist = StanceTwist(P.control_period)
-    anchor, pivot, turned = Pose2D(1.0, 0.5, 0.3), np.array([1.14, 0.54]), 0.1
-    for share in np.linspace(0.0, 1.0, 40):
-        twist.update(anchor, anchor.yaw + share * turned, pivot)
-    for _ in range(40):  # the filter settles
-        twist.update(anchor, anchor.yaw + turned, pivot)
-    about = Pose2D(*pivot, turned) @ Pose2D(*(-pivot)) @ Pose2D(anchor.x, anchor.y)
-    assert twist.twist == pytest.approx(turned, abs=1e-4)
-    np.testing.assert_allclose(twist.shift, (about.x - anchor.x, about.y - anchor.y), atol=0.001)  # of second order
-    before = twist.twist
-    twist.update(anchor, anchor.yaw + turned, np.full(2, np.nan))  # no contact, no pivot
-    assert math.isfinite(twist.shift[0]) and twist.twist == pytest.approx(before, abs=1e-4)
-
-
-def test_feet_keep_their_places_to_each_other_when_a_twist_is_taken_off() -> None:
-    twist = StanceTwist(P.control_period)
-    twist.shift, twist.twist = (0.02, -0.01), 0.1
-    stance, lifted = Footstep(Side.LEFT, Pose2D(0.0, 0.12)), Footstep(Side.RIGHT, Pose2D(0.0, -0.12))
-    landed = Footstep(Side.RIGHT, Pose2D(0.32, -0.13))  # shift included
-    left, right = twist.carried((stance, lifted), (stance, landed))
-    assert right == landed
-    assert left.pose.as_array() == pytest.approx([0.02, 0.11, 0.1])
-    assert twist.carried((stance, lifted), (stance, lifted)) == (stance, lifted)
 
 
 @pytest.mark.sim
