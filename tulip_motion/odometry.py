@@ -1,11 +1,14 @@
 """How far dead reckoning may be off: its covariance, carried along over steps and time.
 
-The position is that of the stance foot plus the way from there to base_link; the heading is the IMU's. So the
-errors e = truth - odometry grow like this:
+The position follows the soles over the ground (ground_track.py); the heading is the IMU's. So the errors
+e = truth - odometry grow like this:
 
 - The IMU's heading drifts at a rate b that is constant in a run but unknown: e_yaw(t) = e_yaw(0) + b t.
 - A heading that is off turns all of the way that follows: e_xy += J d (e_yaw + b dt / 2), where d is the way of
   the base in odom and J the quarter turn. With b in the state, e = (x, y, yaw, b), this is linear and exact in d.
+- To second order, a heading that is off shortens the way by d e_yaw^2 / 2. After two minutes that is more than all
+  slips. The heading's error is nearly all drift, z sigma(t) with one z in a run, so that the shortening is
+  z^2 / 2 sum sigma^2 d. Its mean square is taken: 3 / 4 of the square of the sum.
 - Each step adds what the IMU's noise makes of the way from foot to foot: some tenths of a millimetre.
 - Soles slip when they twist on the ground, which IMU and joints show. `GroundTrack` takes most of the shift off; the
   rest is a share of the twist, in the axes of the foot, more across than along it. Steps whose sole did not twist were
