@@ -58,6 +58,7 @@ class GroundTrack:
 
     Attributes:
         position: (x, y) in odom [m].
+        pivots: The point of the left and the right sole that stays when the sole twists, in its axes [m].
     """
 
     def __init__(self, parameters: MotionParameters, cells: Sequence[Sequence[Point]]) -> None:
@@ -84,7 +85,7 @@ class GroundTrack:
         self.position = position
         self._soles, self._base = _seen_from_above(estimate)
         self._shares = self._counted(estimate.loads) or (0.5, 0.5)
-        self._pivots = [(0.0, 0.0), (0.0, 0.0)]
+        self.pivots = [(0.0, 0.0), (0.0, 0.0)]
 
     def update(self, estimate: Estimate, cells: Array, acceleration: Point) -> None:
         """Advance by one tick.
@@ -106,11 +107,11 @@ class GroundTrack:
         for side in (0, 1):
             share = 0.5 * (before[side] + self._shares[side])
             if share == 0.0:
-                self._pivots[side] = (0.0, 0.0)
+                self.pivots[side] = (0.0, 0.0)
                 continue
             # The pivot stays, so that base_link goes against the way that the joints show of it. The sole's axes are
             # taken as they are: to first order in their turn, the IMU's noise would add up to millimetres a minute.
-            along, across = self._pivots[side]
+            along, across = self.pivots[side]
             (forward_x, left_x, _, place_x), (forward_y, left_y, _, place_y) = soles[side]
             (last_forward_x, last_left_x, _, last_x), (last_forward_y, last_left_y, _, last_y) = self._soles[side]
             way_x = place_x - last_x + (forward_x - last_forward_x) * along + (left_x - last_left_x) * across
@@ -121,11 +122,11 @@ class GroundTrack:
             if abs(rate) > TWIST_RATE:
                 self._twist += share * abs(rate) * self._dt
             # How the sole is pressed now says how it moves until the next tick.
-            self._pivots[side] = (0.0, 0.0)
+            self.pivots[side] = (0.0, 0.0)
             if loads[side] > self._contact_force:
                 ax, ay = acceleration
                 pushed = (-forward_x * ax - forward_y * ay, -left_x * ax - left_y * ay)
-                self._pivots[side] = pivot(self._cells[side], cells[side].tolist(), pushed, rate)
+                self.pivots[side] = pivot(self._cells[side], cells[side].tolist(), pushed, rate)
         self.position, self._soles, self._base = (x, y), soles, base
 
     def _counted(self, loads: tuple[float, float]) -> tuple[float, float] | None:

@@ -269,13 +269,21 @@ class Motion:
 
     def _track_ground(self, estimate: Estimate, sensors: Sensors) -> None:
         """Follow base_link over the ground. A robot that lies or sinks is taken to stay where its feet are."""
-        x, y = float(estimate.base_position[0]), float(estimate.base_position[1])
+        estimator = self._estimator
+        x, y = (float(estimate.base_position[i]) - estimator.shift[i] for i in (0, 1))
         if self._started and self._mode not in (MotionMode.LIMP, MotionMode.FALLEN):
             ax, ay, _ = self._tracking.com_acceleration.tolist()
             self._ground.update(estimate, sensors.foot_cells, (ax, ay))
         else:
             self._ground.begin(estimate, (x + self._shift[0], y + self._shift[1]))
         self._shift = (self._ground.position[0] - x, self._ground.position[1] - y)
+        # While it walks, the robot minds where its body is, and steps there; else, how it stands on its feet.
+        if self._gait is None:
+            for side, foot in zip(Side, estimator.anchors, strict=True):
+                estimator.anchor(Footstep(side, Pose2D(foot.x + self._shift[0], foot.y + self._shift[1], foot.yaw)))
+            self._shift = (0.0, 0.0)
+        estimator.shift = self._shift if isinstance(self._gait, Walking) else (0.0, 0.0)
+        estimator.pivots = self._ground.pivots
 
     def _start(self, estimate: Estimate) -> None:
         """Begin to stand where the robot is."""
@@ -355,8 +363,7 @@ class Motion:
         dt = self._parameters.control_period
         dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
         if isinstance(self._gait, Walking):
-            shift_x, shift_y = self._shift
-            landed = [Pose2D(at.x + shift_x, at.y + shift_y, at.yaw) for at in map(planar_pose, estimate.soles)]
+            landed = [planar_pose(sole) for sole in estimate.soles]
             before = self._gait.feet
             reference = self._gait.tick(dt, self._wish(), (dcm[0], dcm[1]), landed, estimate.loads)
             self._gait.feet = carried(before, self._gait.feet, self._shift, estimate)
@@ -394,6 +401,7 @@ class Motion:
             )
             for foot in feet:
                 self._estimator.anchor(foot)
+            self._shift = self._estimator.shift = (0.0, 0.0)
 
     def _stabilize(self, estimate: Estimate, reference: Reference) -> Balance:
         """Return the ZMP that brings the measured DCM back to the planned one, within the soles that stand."""

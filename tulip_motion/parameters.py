@@ -135,6 +135,7 @@ class MotionParameters:
     zmp_limit_toe: float = 0.09  # [m] ahead of the aim point
     zmp_limit_side: float = _tuned("zmp_limit_side")  # [m] either side of the aim point
     observer_position_gain: float = _tuned("observer_position_gain")  # [1/s]
+    observer_twist_share: float = 0.5  # of a sole's twist, in the body's velocity; all of it keeps feet twisting
     imu_bias_time: float = 2.0  # [s] of single support, after which 63 % of the IMU's tilt error is known
     imu_bias_limit: float = 0.01  # [rad] more is no mounting error but ground that is not level
     observer_velocity_gain: float = _tuned("observer_velocity_gain")  # [1/s]

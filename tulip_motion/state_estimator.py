@@ -1,7 +1,9 @@
 """Where the body is: base pose from the IMU and the stance leg, CoM from the model, smoothed by the pendulum.
 
-The stance sole is taken to be fixed on the ground where it landed. The IMU gives the attitude and the
-heading, so only the stance foot's slip and the landing pose's error add up in the position.
+The stance sole is taken to be on the ground where it landed. A foot that is pushed onto its edge rolls about its centre
+of pressure, and one that twists turns about the pivot that GroundTrack finds; were its origin taken to stand still, the
+body would seem to move. The IMU gives the attitude and the heading, so only the stance foot's slip and the landing
+pose's error add up in the position.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from tulip_description.quaternion import Quaternion, quaternion_conjugate, quate
 from tulip_description.robot_io import Sensors
 from tulip_motion.footsteps import Footstep
 from tulip_motion.interface import Side
+from tulip_motion.lipm import GRAVITY
 from tulip_motion.parameters import MotionParameters
 
 Array = NDArray[np.float64]
@@ -90,6 +93,10 @@ class StateEstimator:
         self._com_velocity = [0.0, 0.0, 0.0]
         self.anchors: list[Pose2D] = [Pose2D(), Pose2D()]
         """Where the left and the right sole stand, or were put down last, in odom."""
+        self.shift = (0.0, 0.0)
+        """How far the body has moved by slips of the feet since they were put down, in odom [m]."""
+        self.pivots = [(0.0, 0.0), (0.0, 0.0)]
+        """The point of the left and the right sole that stays when the sole twists, in its axes [m]."""
 
     def anchor(self, foot: Footstep) -> None:
         """Take a foot to be fixed on the ground at its pose from now on."""
@@ -98,6 +105,7 @@ class StateEstimator:
     def restart(self) -> None:
         """Forget the CoM's motion; the next update begins with the feet where they are measured."""
         self._com = None
+        self.shift = (0.0, 0.0)
 
     def update(self, sensors: Sensors, left_weight: float, acceleration: Array) -> Estimate:
         """Return the state of the body.
@@ -122,7 +130,7 @@ class StateEstimator:
             self._begin(soles)
         cells = sensors.foot_cells
         loads = (sum(cells[0].tolist()), sum(cells[1].tolist()))
-        position, velocity, yaw_rates = self._from_feet(left_weight, loads)
+        position, velocity, yaw_rates = self._from_feet(left_weight, cells, loads)
         x, y, z = position
         for sole, place in zip(soles, self._sole_positions, strict=True):
             px, py, pz = place.tolist()
@@ -130,7 +138,7 @@ class StateEstimator:
         rotation = self._base_rotation.copy()
         if left_weight in (0.0, 1.0):
             self._learn_tilt_bias(soles[Side.LEFT if left_weight == 1.0 else Side.RIGHT], rotation)
-        com, com_velocity = self._observe(position, velocity, acceleration)
+        com, com_velocity = self._observe(position, velocity, self._felt(acceleration, loads))
         return Estimate(
             np.array(position),
             rotation,
@@ -172,26 +180,43 @@ class StateEstimator:
         y += share * (c * about_y - s * about_x)
         self._tilt_bias = (min(max(x, -most), most), min(max(y, -most), most))
 
-    def _from_feet(self, left_weight: float, loads: tuple[float, float]) -> tuple[Point, Point, tuple[float, float]]:
-        """Return position [m] and velocity [m/s] of the base that leave the feet that carry where they stand.
+    def _from_feet(
+        self, left_weight: float, cells: Array, loads: tuple[float, float]
+    ) -> tuple[Point, Point, tuple[float, float]]:
+        """Return position [m] and velocity [m/s] of the base for which the feet that carry stay where they stand.
 
         The third is the yaw rate of the soles [rad/s], 0 of one in the air.
         """
         x = y = z = vx = vy = vz = 0.0
         rates = [0.0, 0.0]
         for side, weight in ((Side.LEFT, left_weight), (Side.RIGHT, 1.0 - left_weight)):
-            if weight == 0.0 and loads[side] < self._parameters.contact_force:
+            carries = loads[side] > self._parameters.contact_force
+            if weight == 0.0 and not carries:
                 continue
             motion = pin.getFrameVelocity(self._model, self._data, self._soles[side], pin.LOCAL_WORLD_ALIGNED)
-            wx, wy, wz, _, _, rates[side] = motion.vector.tolist()
+            ux, uy, uz, wx, wy, wz = motion.vector.tolist()
+            rates[side] = wz
+            if weight == 0.0:
+                continue
+            place = self._data.oMf[self._soles[side]]
+            px, py, pz = place.translation.tolist()
+            if carries:
+                (xx, xy, _), (yx, yy, _), (zx, zy, _) = place.rotation.tolist()
+                forward, left = (cells[side].dot(self._cells[side]) / loads[side]).tolist()
+                rx, ry, rz = xx * forward + xy * left, yx * forward + yy * left, zx * forward + zy * left
+                along, across = self.pivots[side]
+                twist = self._parameters.observer_twist_share * wz
+                ux += wy * rz - twist * (yx * along + yy * across)
+                uy += twist * (xx * along + xy * across) - wx * rz
+                uz += wx * ry - wy * rx
+                pz += rz
             anchor = self.anchors[side]
-            px, py, pz = self._sole_positions[side].tolist()
-            x += weight * (anchor.x - px)
-            y += weight * (anchor.y - py)
+            x += weight * (anchor.x + self.shift[0] - px)
+            y += weight * (anchor.y + self.shift[1] - py)
             z -= weight * pz
-            vx -= weight * wx
-            vy -= weight * wy
-            vz -= weight * wz
+            vx -= weight * ux
+            vy -= weight * uy
+            vz -= weight * uz
         return (x, y, z), (vx, vy, vz), (rates[0], rates[1])
 
     def _begin(self, soles: Array) -> None:
@@ -202,6 +227,11 @@ class StateEstimator:
         if keep == Pose2D():
             keep = left
         self.anchors = [Pose2D(keep.x, keep.y, left.yaw), keep_distance(keep, left, right)]
+
+    def _felt(self, acceleration: Array, loads: tuple[float, float]) -> Array:
+        """Return what the CoM can follow of a commanded acceleration: without contact it falls freely."""
+        in_flight = loads[0] + loads[1] < self._parameters.contact_force
+        return np.array((0.0, 0.0, -GRAVITY)) if in_flight else acceleration
 
     def _observe(self, position: Point, velocity: Point, acceleration: Array) -> tuple[Array, Array]:
         """Predict the CoM with the commanded acceleration and pull it to the measured one; return its state.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -38,12 +40,20 @@ def sensors(seed: int, imu: np.ndarray) -> Sensors:
     return Sensors(0, joints, rng.uniform(-1, 1, 14), np.zeros(14), imu, rng.uniform(-1, 1, 3), np.zeros(3), cells)
 
 
-def estimate(reading: Sensors, left_weight: float, mount: np.ndarray, anchors: tuple[Pose2D, Pose2D]) -> Estimate:
+def estimate(
+    reading: Sensors,
+    left_weight: float,
+    mount: np.ndarray,
+    anchors: tuple[Pose2D, Pose2D],
+    shift: tuple[float, float] = (0.0, 0.0),
+    pivots: Sequence[tuple[float, float]] = ((0.0, 0.0), (0.0, 0.0)),
+) -> Estimate:
     estimator = StateEstimator(MotionParameters(), MODEL, CELLS, mount)
     level = Sensors(**{**vars(reading), "imu_orientation": quaternion(mount)})  # base_link as in odom
     estimator.update(level, 0.5, np.zeros(3))
     for side in Side:
         estimator.anchor(Footstep(side, anchors[side]))
+    estimator.shift, estimator.pivots = shift, list(pivots)
     return estimator.update(reading, left_weight, np.zeros(3))
 
 
@@ -66,10 +76,11 @@ def test_heading_counts_from_the_start() -> None:
 
 
 @pytest.mark.parametrize("left_weight", [1.0, 0.0, 0.3])
-def test_base_lies_and_moves_such_that_the_feet_that_carry_stand_where_they_are_anchored(left_weight: float) -> None:
+def test_base_lies_and_moves_such_that_the_feet_that_carry_stay_on_the_ground(left_weight: float) -> None:
     anchors = (Pose2D(0.3, 0.2, 0.1), Pose2D(0.25, -0.05, 0.0))
+    shift, pivots = (0.01, -0.02), [(0.1, 0.03), (0.05, 0.0)]
     reading = sensors(3, quaternion(pin.exp3(np.array([0.03, -0.05, 0.4]))))
-    seen = estimate(reading, left_weight, np.eye(3), anchors)
+    seen = estimate(reading, left_weight, np.eye(3), anchors, shift, pivots)
     data = MODEL.createData()
     q = np.concatenate([seen.base_position, quaternion(seen.base_rotation), reading.joint_positions[:12]])
     v = np.concatenate(
@@ -78,10 +89,18 @@ def test_base_lies_and_moves_such_that_the_feet_that_carry_stand_where_they_are_
     pin.forwardKinematics(MODEL, data, q, v)
     pin.updateFramePlacements(MODEL, data)
     frames = [MODEL.getFrameId(name) for name in ("l_sole", "r_sole")]
-    off = [data.oMf[f].translation - [a.x, a.y, 0.0] for f, a in zip(frames, anchors, strict=True)]
-    moving = [pin.getFrameVelocity(MODEL, data, f, pin.LOCAL_WORLD_ALIGNED).linear for f in frames]
-    np.testing.assert_allclose(left_weight * off[0] + (1.0 - left_weight) * off[1], 0.0, atol=1e-12)
-    np.testing.assert_allclose(left_weight * moving[0] + (1.0 - left_weight) * moving[1], 0.0, atol=1e-12)
+    off, moving = np.zeros(3), np.zeros(3)
+    for side, weight in ((0, left_weight), (1, 1.0 - left_weight)):
+        sole, motion = data.oMf[frames[side]], pin.getFrameVelocity(MODEL, data, frames[side], pin.LOCAL_WORLD_ALIGNED)
+        pressed = sole.rotation @ [*np.average(CELLS[side], axis=0, weights=reading.foot_cells[side]), 0.0]
+        pivot = sole.rotation @ [*pivots[side], 0.0]
+        anchor = (anchors[side].x + shift[0], anchors[side].y + shift[1], -pressed[2])
+        off += weight * (sole.translation - anchor)
+        roll, twist = motion.angular * (1.0, 1.0, 0.0), motion.angular * (0.0, 0.0, 1.0)
+        twist *= MotionParameters().observer_twist_share
+        moving += weight * (motion.linear + np.cross(roll, pressed) + np.cross(twist, pivot))
+    np.testing.assert_allclose(off, 0.0, atol=1e-12)
+    np.testing.assert_allclose(moving, 0.0, atol=1e-12)
     np.testing.assert_allclose(seen.angular_velocity, seen.base_rotation @ reading.imu_angular_velocity, atol=1e-12)
     for sole, frame in zip(seen.soles, frames, strict=True):
         np.testing.assert_allclose(sole, data.oMf[frame].homogeneous, atol=1e-12)
