@@ -31,7 +31,12 @@ def main(
     space: Annotated[
         str, typer.Option(help="Parameters to search over, with commas between; none: all of gait.yaml.")
     ] = "",
-    apply: Annotated[bool, typer.Option("--apply", help="Write the best gait into the gait file.")] = False,
+    apply: Annotated[
+        bool,
+        typer.Option(
+            "--apply", help="Judge the best gaits in unseen worlds, and write the best of them into the gait file."
+        ),
+    ] = False,
     gait: Annotated[Path, typer.Option(help="The gait file that --apply writes.")] = GAIT,
     seeds: Annotated[int, typer.Option(help="Random worlds that each gait walks in.", min=1)] = 4,
     seconds: Annotated[float, typer.Option(help="Length of each walk.", min=1.0)] = 12.0,
@@ -52,6 +57,8 @@ def main(
         tuner = Tuner(study, default_settings(seeds, seconds))
         if trials:
             search(tuner, trials, names, workers, console)
+        if apply:
+            confirm(tuner, workers, console)
         report(tuner, console)
         if apply:
             tuner.apply(gait)
@@ -74,19 +81,28 @@ def search(tuner: Tuner, trials: int, names: list[str], workers: int | None, con
             bar.advance(task)
             text = "  ".join(f"{name.replace('_', ' ')} {value:.3f}" for name, value in figures.as_dict().items())
             console.print(f"cost {cost:7.3f}  {text}", highlight=False, soft_wrap=True)
-            bar.update(task, description=f"gaits, best cost {tuner.best()[0]:.3f}")
+            bar.update(task, description=f"gaits, best cost {tuner.best().figures.cost:.3f}")
 
         tuner.run(trials, names, workers, done)
 
 
+def confirm(tuner: Tuner, workers: int | None, console: Console) -> None:
+    """Judge the best gaits in unseen worlds with a progress bar."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console) as bar:
+        task = bar.add_task("best gaits in unseen worlds", total=None)
+        tuner.confirm(workers, lambda made, total: bar.update(task, completed=made, total=total))
+
+
 def report(tuner: Tuner, console: Console) -> None:
     """Print the best gait beside the one that the search started from."""
-    cost, figures, values = tuner.best()
-    console.print(f"Best of {tuner.finished}: cost {cost:.3f}", highlight=False)
-    for name, value in figures.as_dict().items():
+    best = tuner.best()
+    where = ", in unseen worlds" if best.unseen else ""
+    console.print(f"Best of {tuner.finished}: cost {best.figures.cost:.3f}{where}", highlight=False)
+    for name, value in best.figures.as_dict().items():
         console.print(f"  {name.replace('_', ' ')} {value:.3f}", highlight=False)
     table = Table("parameter", "start", "best", "bounds")
-    for name, value in values.items():
+    for name, value in best.values.items():
         low, high = SPACE[name]
         table.add_row(name, f"{tuner.settings.base[name]:g}", f"{value:.4g}", f"{low:g} to {high:g}")
     console.print(table)

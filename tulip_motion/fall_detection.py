@@ -29,13 +29,13 @@ class FallDetector:
         self._falling = 0
         self._upright = 0
 
-    def is_falling(self, rotation: Array, angular_velocity: Array, dcm: Array, soles: Array) -> str:
+    def is_falling(self, rotation: Array, angular_velocity: Array, dcm: tuple[float, float], soles: Array) -> str:
         """Return why the robot falls, in words, or "" as long as it may stay up.
 
         Args:
             rotation: (3, 3) from base_link to odom.
             angular_velocity: (3,) of base_link, odom axes [rad/s].
-            dcm: (2,) in odom [m].
+            dcm: (x, y) in odom [m].
             soles: (2, 4, 4) transforms of the soles in odom.
         """
         p = self._parameters
@@ -93,12 +93,12 @@ def predicted_tilt(rotation: Array, angular_velocity: Array, horizon: float) -> 
     return tilt, math.hypot(scale * up_x + horizon * rate_x, scale * up_y + horizon * rate_y)
 
 
-def beyond_feet(rotation: Array, dcm: Array, soles: Array, zmp_forward: float) -> tuple[float, float]:
+def beyond_feet(rotation: Array, dcm: tuple[float, float], soles: Array, zmp_forward: float) -> tuple[float, float]:
     """Return how far the DCM is from the line between the feet: forward and left of the torso [m].
 
     Args:
         rotation: (3, 3) from base_link to odom.
-        dcm: (2,) in odom [m].
+        dcm: (x, y) in odom [m].
         soles: (2, 4, 4) transforms of the soles in odom.
         zmp_forward: Middle of a sole ahead of its ankle [m].
     """
@@ -110,5 +110,5 @@ def beyond_feet(rotation: Array, dcm: Array, soles: Array, zmp_forward: float) -
     way_x, way_y = bx - ax, by - ay
     share = ((dcm[0] - ax) * way_x + (dcm[1] - ay) * way_y) / max(way_x**2 + way_y**2, 1e-9)
     share = min(max(share, 0.0), 1.0)
-    dx, dy = float(dcm[0]) - ax - share * way_x, float(dcm[1]) - ay - share * way_y
+    dx, dy = dcm[0] - ax - share * way_x, dcm[1] - ay - share * way_y
     return c * dx + s * dy, -s * dx + c * dy

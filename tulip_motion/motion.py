@@ -33,7 +33,6 @@ from tulip_motion.interface import (
 from tulip_motion.inverse_kinematics import rotation_z
 from tulip_motion.kick import Kick, moved
 from tulip_motion.kick_plan import expected_ball, plan_kick, refused_numbers
-from tulip_motion.lipm import time_constant
 from tulip_motion.odometry import DeadReckoning
 from tulip_motion.paper_gait import PaperGait
 from tulip_motion.parameters import MotionParameters
@@ -66,7 +65,6 @@ class Motion:
         self._tracking = Tracking(p, model, robot)
         self._soles = robot.feet
         self._reach = reach(p, robot)
-        self._omega = 1.0 / time_constant(p.com_height)
         self._command = WalkCommand(0, WalkMode.STAND)
         self._mode = MotionMode.STAND
         self._reason = ""
@@ -208,7 +206,6 @@ class Motion:
     def state(self) -> MotionState:
         """Return the state of the legs as of the last tick."""
         estimate, tracking = self._estimate, self._tracking
-        dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
         walking = self._mode not in (MotionMode.LIMP, MotionMode.FALLEN)
         reference = self._reference if walking else None
         planned = np.array(reference.dcm) if reference else np.full(2, np.nan)
@@ -222,7 +219,7 @@ class Motion:
             tracking.com_planned if reference else np.full(3, np.nan),
             estimate.com_velocity,
             tracking.com_velocity_planned if reference else np.full(3, np.nan),
-            dcm,
+            np.array(estimate.dcm),
             planned,
             estimate.zmp,
             np.array(self._balance.zmp) if reference else np.full(2, np.nan),
@@ -307,8 +304,7 @@ class Motion:
                 self._estimator.restart()
                 self._mode, self._reason, self._gait, self._started = MotionMode.STAND, "", None, False
             return
-        dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
-        fall = self._falls.is_falling(estimate.base_rotation, estimate.angular_velocity, dcm, estimate.soles)
+        fall = self._falls.is_falling(estimate.base_rotation, estimate.angular_velocity, estimate.dcm, estimate.soles)
         if fall:
             self._fall(fall)
         elif wanted is WalkMode.LIMP:
@@ -333,8 +329,7 @@ class Motion:
             away = not is_at(wish, middle(self._feet(), p.stance_width), p.goal_tolerance, p.goal_tolerance_yaw)
         else:
             away = wish is not None
-        dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
-        return away or (p.gait == "dcm" and must_step(p, self._feet(), (float(dcm[0]), float(dcm[1]))))
+        return away or (p.gait == "dcm" and must_step(p, self._feet(), estimate.dcm))
 
     def _wish(self) -> Wish:
         """Return what the present command asks of the walk."""
@@ -361,17 +356,16 @@ class Motion:
     def _advance_gait(self, estimate: Estimate) -> Reference:
         """Return what walk or kick want now, or standing where the feet are, and keep the feet that they put down."""
         dt = self._parameters.control_period
-        dcm = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
         if isinstance(self._gait, Walking):
             landed = [planar_pose(sole) for sole in estimate.soles]
             before = self._gait.feet
-            reference = self._gait.tick(dt, self._wish(), (dcm[0], dcm[1]), landed, estimate.loads)
+            reference = self._gait.tick(dt, self._wish(), estimate.dcm, landed, estimate.loads)
             self._gait.feet = carried(before, self._gait.feet, self._shift, estimate)
             self._anchor(self._gait.feet)
             return reference
         if isinstance(self._gait, PaperGait):
             landed = [planar_pose(sole) for sole in estimate.soles]
-            reference = self._gait.tick(dt, self._wish(), (dcm[0], dcm[1]), landed, estimate.loads)
+            reference = self._gait.tick(dt, self._wish(), estimate.dcm, landed, estimate.loads)
             self._anchor(self._gait.feet)
             return reference
         if isinstance(self._gait, Kick):
@@ -406,17 +400,14 @@ class Motion:
     def _stabilize(self, estimate: Estimate, reference: Reference) -> Balance:
         """Return the ZMP that brings the measured DCM back to the planned one, within the soles that stand."""
         # In open loop nothing is corrected: the plan's own DCM leaves the plan's ZMP.
-        measured = estimate.com[:2] + estimate.com_velocity[:2] / self._omega
-        dcm = measured if reference.com is None else reference.dcm
+        dcm = estimate.dcm if reference.com is None else reference.dcm
         other = None
         if reference.support is Support.DOUBLE:
             foot = reference.other
             other = Footstep(
                 reference.stance.side.other, Pose2D(float(foot.position[0]), float(foot.position[1]), foot.yaw)
             )
-        return stabilize(
-            self._parameters, reference.zmp, reference.dcm, (float(dcm[0]), float(dcm[1])), reference.stance, other
-        )
+        return stabilize(self._parameters, reference.zmp, reference.dcm, dcm, reference.stance, other)
 
     def _send(self, order: Order) -> JointCommand:
         """Number an order of the joints, and stamp it with the time of the sensors that it answers."""

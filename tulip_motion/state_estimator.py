@@ -22,7 +22,7 @@ from tulip_description.quaternion import Quaternion, quaternion_conjugate, quate
 from tulip_description.robot_io import Sensors
 from tulip_motion.footsteps import Footstep
 from tulip_motion.interface import Side
-from tulip_motion.lipm import GRAVITY
+from tulip_motion.lipm import GRAVITY, time_constant
 from tulip_motion.parameters import MotionParameters
 
 Array = NDArray[np.float64]
@@ -40,6 +40,7 @@ class Estimate:
         angular_velocity: (3,) of base_link, odom axes [rad/s].
         joint_positions, joint_velocities: (12,) [rad], [rad/s].
         com, com_velocity: (3,) smoothed by the observer [m], [m/s].
+        dcm: (x, y) of the divergent component of motion, c + Tc c' [m]; plain numbers, since much is reckoned from it.
         soles: (2, 4, 4) transforms of the soles.
         sole_yaw_rates: At which the left and the right sole turn, by gyro and joints [rad/s]; 0 in the air.
         zmp: (2,) measured centre of pressure [m]; NaN without contact.
@@ -55,6 +56,7 @@ class Estimate:
     joint_velocities: Array
     com: Array
     com_velocity: Array
+    dcm: tuple[float, float]
     soles: Array
     sole_yaw_rates: tuple[float, float]
     zmp: Array
@@ -75,6 +77,7 @@ class StateEstimator:
             imu_rotation: (3, 3) from imu_link to base_link.
         """
         self._parameters = parameters
+        self._time_constant = time_constant(parameters.com_height)
         self._model = model
         data = self._data = model.createData()
         self._soles = (model.getFrameId(frames.LEFT_SOLE), model.getFrameId(frames.RIGHT_SOLE))
@@ -148,6 +151,7 @@ class StateEstimator:
             v[6:].copy(),
             com,
             com_velocity,
+            self._dcm(),
             soles,
             yaw_rates,
             self._centre_of_pressure(cells, soles, loads),
@@ -261,6 +265,11 @@ class StateEstimator:
                 self._com[i] = c + dt * (v + k_p * (m - c))
                 self._com_velocity[i] = v + dt * (a + k_v * (mv + base - v))
         return np.array(self._com), np.array(self._com_velocity)
+
+    def _dcm(self) -> tuple[float, float]:
+        assert self._com is not None
+        (x, y, _), (vx, vy, _) = self._com, self._com_velocity
+        return x + self._time_constant * vx, y + self._time_constant * vy
 
     def _centre_of_pressure(self, cells: Array, soles: Array, loads: tuple[float, float]) -> Array:
         """Return where the cells' forces act together, seen from above."""

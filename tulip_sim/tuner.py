@@ -12,11 +12,13 @@ import logging
 import multiprocessing
 import os
 import signal
+import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, astuple, dataclass, fields
 from pathlib import Path
 
+import numpy as np
 import optuna
 from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
@@ -28,6 +30,10 @@ from tulip_sim.tuning import SPACE, Figures, check_names, evaluate
 
 STUDY = "gait"
 SETTINGS = "settings"
+CONFIRMED = "confirmed"
+CANDIDATES = 3  # of the best gaits that are judged again
+UNSEEN = 2  # times as many worlds for that as for a trial
+SPREAD = 0.08  # of the range of each parameter: standard deviation of the first gaits round the base
 FIGURES = [field.name for field in fields(Figures)]
 
 
@@ -48,6 +54,21 @@ class TuningSettings:
     seeds: int
     seconds: float
     base: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A gait and how good it was.
+
+    Attributes:
+        figures: See there.
+        values: All gait parameters by name.
+        unseen: Whether it was judged in worlds that no trial had seen.
+    """
+
+    figures: Figures
+    values: dict[str, float]
+    unseen: bool
 
 
 class Tuner:
@@ -71,9 +92,7 @@ class Tuner:
         self._path = path
         try:
             storage = JournalStorage(JournalFileBackend(str(path)))
-            self._study = optuna.create_study(
-                storage=storage, study_name=STUDY, load_if_exists=True, sampler=optuna.samplers.TPESampler(seed=0)
-            )
+            self._study = optuna.create_study(storage=storage, study_name=STUDY, load_if_exists=True)
             known = self._study.user_attrs.get(SETTINGS)
             trials = self._study.trials
         except OSError as error:
@@ -95,6 +114,10 @@ class Tuner:
                     f"Study {path} was begun with --seeds {self.settings.seeds} --seconds {self.settings.seconds:g};"
                     " trials with others cannot be compared. Give these, or begin another study."
                 )
+        outside = [name for name, (low, high) in SPACE.items() if not low <= self.settings.base[name] <= high]
+        if outside:
+            raise StudyError(f"The gait to start from lies outside the bounds of tuning.py in {', '.join(outside)}.")
+        self._study.sampler = _sampler(self.settings.base)
         for trial in trials:  # of a process that was killed
             if trial.state is TrialState.RUNNING:
                 self._give_back(trial.number, trial.params)
@@ -120,6 +143,7 @@ class Tuner:
             KeyboardInterrupt: after all that was finished has been kept.
         """
         check_names(names)
+        self._study.set_user_attr(CONFIRMED, {})  # there will be better ones
         # Each worker is one single-threaded process: more threads would only wait for each other.
         os.environ.setdefault("OMP_NUM_THREADS", "1")
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -149,17 +173,51 @@ class Tuner:
                     process.terminate()
             pool.shutdown(cancel_futures=True)
 
-    def best(self) -> tuple[float, Figures, dict[str, float]]:
-        """Return cost, figures and all gait parameters of the best trial.
+    def best(self) -> Judged:
+        """Return the best gait: of those judged in unseen worlds, if there are any, else of all.
 
         Raises:
             StudyError: if no trial has finished.
         """
         if not self.finished:
             raise StudyError(f"Study {self._path} holds no finished trial; run some first.")
+        confirmed: dict[str, list[float]] = self._study.user_attrs.get(CONFIRMED, {})
+        if confirmed:
+            number, judged = min(confirmed.items(), key=lambda item: Figures(*item[1]).cost)
+            return Judged(Figures(*judged), self._gait(self._study.trials[int(number)]), True)
         trial = self._study.best_trial
         figures = Figures(**{name: float(trial.user_attrs[name]) for name in FIGURES})
-        return float(trial.value or 0.0), figures, {**self.settings.base, **trial.params}
+        return Judged(figures, self._gait(trial), False)
+
+    def confirm(self, workers: int | None, done: Callable[[int, int], None]) -> None:
+        """Judge the best gaits again, and the one that the search started from, in worlds that no trial has seen.
+
+        The best of many trials is partly the luckiest in their worlds.
+
+        Args:
+            workers: Processes; all cores by default.
+            done: Told how many judgements of how many are made.
+        """
+        complete = self._study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
+        chosen = {complete[0].number: complete[0]} | {
+            trial.number: trial for trial in sorted(complete, key=lambda trial: trial.value or 0.0)[:CANDIDATES]
+        }
+        seeds = range(self.settings.seeds, (1 + UNSEEN) * self.settings.seeds)
+        tasks = [(number, seed) for number in chosen for seed in seeds]
+        figures: dict[int, list[Figures]] = {number: [] for number in chosen}
+        with ProcessPoolExecutor(workers or os.cpu_count() or 1, initializer=_ignore_interrupts) as pool:
+            judging = [
+                pool.submit(evaluate, self._gait(chosen[number]), (seed,), self.settings.seconds)
+                for number, seed in tasks
+            ]
+            for count, (future, (number, _)) in enumerate(zip(judging, tasks, strict=True), 1):
+                figures[number].append(future.result())
+                done(count, len(tasks))
+        means = {
+            str(number): np.mean([list(astuple(each)) for each in judged], axis=0).tolist()
+            for number, judged in figures.items()
+        }
+        self._study.set_user_attr(CONFIRMED, means)
 
     def apply(self, path: Path = GAIT) -> None:
         """Write the best gait into a gait file.
@@ -167,14 +225,16 @@ class Tuner:
         Raises:
             StudyError: if there is none, or the file cannot be written.
         """
-        cost, figures, values = self.best()
-        rounded = {name: float(f"{value:.4g}") for name, value in values.items()}
+        best = self.best()
+        rounded = {name: float(f"{value:.4g}") for name, value in best.values.items()}
+        worlds = f"{UNSEEN * self.settings.seeds} that none had seen before" if best.unseen else "the same worlds"
         provenance = (
             "",
             f"Best of {self.finished} gaits, each judged by walks of {self.settings.seconds:g} s forward, sideways,",
             f"backward, turning, starting and stopping, and by pushes, in {self.settings.seeds} random worlds each",
-            f"(tulip_sim/tuning.py): cost {cost:.3f}; "
-            + ", ".join(f"{name.replace('_', ' ')} {value:.3f}" for name, value in figures.as_dict().items()),
+            "(tulip_sim/tuning.py).",
+            f"In {worlds} it cost {best.figures.cost:.3f}: "
+            + ", ".join(f"{name.replace('_', ' ')} {value:.3f}" for name, value in best.figures.as_dict().items()),
         )
         try:
             write_gait(path, rounded, provenance)
@@ -185,6 +245,9 @@ class Tuner:
     def _seeds(self) -> range:
         return range(self.settings.seeds)
 
+    def _gait(self, trial: optuna.trial.FrozenTrial) -> dict[str, float]:
+        return {**self.settings.base, **trial.params}
+
     def _give_back(self, number: int, values: dict[str, float]) -> None:
         """Leave a trial that was broken off to be tried again."""
         self._study.tell(number, state=TrialState.FAIL)
@@ -193,6 +256,13 @@ class Tuner:
     def _values(self, trial: optuna.trial.Trial, names: Sequence[str]) -> dict[str, float]:
         searched = {name: trial.suggest_float(name, *SPACE[name]) for name in names}
         return {**self.settings.base, **searched}
+
+
+def _sampler(base: dict[str, float]) -> optuna.samplers.BaseSampler:
+    """Return CMA-ES round a gait: most gaits of the whole space fall at once, and say nothing about better ones."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)  # optuna 6 will drop x0
+        return optuna.samplers.CmaEsSampler(x0=dict(base), sigma0=SPREAD, n_startup_trials=1, seed=0)
 
 
 def default_settings(seeds: int, seconds: float) -> TuningSettings:

@@ -55,7 +55,7 @@ SPACE: dict[str, tuple[float, float]] = {
     "outer_excess_weight": (1.0, 8.0),
     "max_swing_speed": (1.6, 3.5),  # [m/s]
     "dcm_gain": (0.5, 4.0),
-    "zmp_limit_side": (0.045, 0.07),  # [m] half a sole is 0.075 m
+    "zmp_limit_side": (0.045, 0.074),  # [m] half a sole is 0.075 m
     "observer_position_gain": (10.0, 80.0),  # [1/s]
     "observer_velocity_gain": (20.0, 160.0),  # [1/s]
     "height_stiffness": (40.0, 250.0),  # [1/s^2]

@@ -145,7 +145,9 @@ def test_a_study_runs_goes_on_and_is_applied_to_a_gait_file(tmp_path: Path, monk
     assert list(values) == list(SPACE)
     changed = {name for name, value in values.items() if value != read_gait(PATH)[name]}
     assert changed <= {"step_time", "dcm_gain"}
+    assert "in unseen worlds" in second.output
     assert "Best of 2 gaits" in gait.read_text()
+    assert "In 2 that none had seen before" in gait.read_text()
     other = run("--study", str(study), "--seconds", "2")
     assert other.exit_code == 2
     assert "was begun with --seeds 1 --seconds 1" in other.output
