@@ -250,7 +250,8 @@ def _sensor_gain(lens: Lens, parameters: CameraParameters) -> Bytes:
     """Return (H, W, 3): vignetting and white balance, 255 for the brightest channel in the middle."""
     cosine = lens.ray_table()[..., 2].astype(np.float64)
     # Grows with the square of the angle's sine, so that the corners lose the stated share.
-    loss = parameters.vignetting * (1.0 - cosine**2) / float((1.0 - cosine**2).max())
+    loss = parameters.vignetting * (1.0 - cosine**2) / float(np.nanmax(1.0 - cosine**2))
+    loss[np.isnan(loss)] = 1.0  # no light falls into the corners round a fisheye's picture
     balance = np.array([parameters.blue_gain, parameters.green_gain, parameters.red_gain])
     gain = (1.0 - loss)[..., None] * (balance / balance.max())
     return np.asarray((255.0 * gain).round(), np.uint8)

@@ -21,6 +21,10 @@ from tulip_vision.view import Array, Mask, View
 Picture = NDArray[np.uint8]
 
 
+LEAST_COSINE = 0.1
+"""Of the angle to the optical axis, 84 deg, up to which the carpet's outline is looked for."""
+
+
 class Colour(IntFlag):
     """Bits of the colour classes. A pixel may belong to several."""
 
@@ -241,7 +245,8 @@ class Segmenter:
         rows = len(coarse)
         rays = view.lens.ray_table()
         lowest = view.height / math.hypot(view.height, parameters.farthest)  # sine of the angle below the horizon
-        below = view.coarse_sines(step) < -lowest
+        # What a wide lens sees beside or behind itself has no place on that plane.
+        below = (view.coarse_sines(step) < -lowest) & (view.lens.coarse_ray_table(step)[..., 2] > LEAST_COSINE)
         # Thick lines divide runs, so white is part of them; but a grey floor counts as white now and then, and so
         # white joins no parts, and the carpet's edge itself is green.
         carpet = _large_parts(belongs(coarse, Colour.GREEN | Colour.ORANGE) & below)
