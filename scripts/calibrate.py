@@ -7,52 +7,38 @@ import _environment
 if __name__ == "__main__":
     _environment.prepare()
 
-import functools
-import sys
-from collections.abc import Callable, Iterator, Sequence
+import math
 from pathlib import Path
-from typing import Annotated, ParamSpec, TypeVar
+from typing import Annotated
 
 import cv2
 import numpy as np
 import typer
-from numpy.typing import NDArray
+from _calibration_io import Picture, make_folder, progress_bar, read_picture, read_pictures, told, track
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
+from tulip_description.camera_mount import MOUNT_FILE, OFFSETS, MountOffsets, load_mount, write_mount
+from tulip_description.field import load_field
+from tulip_description.planar import Pose2D
+from tulip_description.robot import load_robot
+from tulip_ros.errors import BadInputError, check_writable, unknown
 from tulip_vision.calibration.board_pictures import BoardCamera, PictureParameters, spots
 from tulip_vision.calibration.boards import CHARUCO, CHESSBOARD, Board, Corners
 from tulip_vision.calibration.lens_fit import COEFFICIENTS, FEWEST_PICTURES, LensFit, choose_model, fit_lens
+from tulip_vision.calibration.mount_fit import FITTED, MountCalibration, MountFit
+from tulip_vision.calibration.recording import LENS, read_recording, write_recording
 from tulip_vision.calibration.straighten import beside, draw_corners, straighten
 from tulip_vision.lens import Lens, head_camera_lens
 from tulip_vision.lens_file import read_lens, write_lens
 
 AUTO = "auto"
-Picture = NDArray[np.uint8]
-P = ParamSpec("P")
-Item = TypeVar("Item")
 
 app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True)
 
 KIND = Annotated[str, typer.Option("--board", help=f"{CHESSBOARD} or {CHARUCO}.")]
 SQUARES = Annotated[str, typer.Option(help="Number of squares, not of corners, as in 9x7.")]
 SQUARE = Annotated[float, typer.Option("--square", help="Edge of a square [m].")]
-
-
-def told(command: Callable[P, None]) -> Callable[P, None]:
-    """Tell what cannot be used in one line, with exit code 2."""
-
-    @functools.wraps(command)
-    def run(*arguments: P.args, **options: P.kwargs) -> None:
-        try:
-            command(*arguments, **options)
-        except (BadInputError, ValueError) as error:
-            print(f"error: {error}", file=sys.stderr)
-            raise typer.Exit(EXIT_BAD_INPUT) from None
-
-    return run
 
 
 @app.command()
@@ -141,6 +127,86 @@ def render(
     )
 
 
+@app.command()
+@told
+def record(
+    folder: Annotated[Path, typer.Argument(help="New folder for the pictures and recording.yaml.")],
+    x: Annotated[float, typer.Option(help="Where the robot stands in map [m].")] = 1.2,
+    y: Annotated[float, typer.Option(help="[m]")] = 0.6,
+    yaw: Annotated[float, typer.Option(help="[deg]")] = 10.0,
+    angle: Annotated[float, typer.Option(help="The camera's mount errs by up to this [deg].")] = 2.0,
+    height: Annotated[float, typer.Option(help="And in height by up to this [m].")] = 0.01,
+    seed: Annotated[int, typer.Option(help="Of the mount's errors and of the world.", min=0)] = 1,
+) -> None:
+    """Let a simulated robot with a badly mounted camera stand and look round, for trying out `mount`."""
+    from tulip_sim.camera import CameraParameters, draw_mount
+    from tulip_sim.looking_round import DISTANCES, PANS, look_round
+
+    field = load_field()
+    if not (abs(x) <= field.carpet_length / 2.0 and abs(y) <= field.carpet_width / 2.0):
+        raise BadInputError(f"Place ({x}, {y}) m is not on the carpet; expected one on the field.")
+    camera = CameraParameters(mount_angle=math.radians(angle), mount_height=height, mount_seed=seed)
+    make_folder(folder)
+    place, taken_by, shots = Pose2D(x, y, math.radians(yaw)), head_camera_lens(), []
+    console = Console()
+    with progress_bar("looking round", len(DISTANCES) * len(PANS), console) as advance:
+        for picture, shot in look_round(seed, place, taken_by, camera):
+            cv2.imwrite(str(folder / shot.picture), picture)
+            shots.append(shot)
+            advance()
+    write_recording(folder, place, shots)
+    write_lens(folder / LENS, taken_by)
+    write_mount(folder / "true_mount.yaml", draw_mount(camera), ["What the simulator's camera really had."])
+    console.print(f"Wrote {len(shots)} pictures. Next: calibrate.py mount {folder}", soft_wrap=True, highlight=False)
+
+
+@app.command()
+@told
+def mount(
+    folder: Annotated[Path, typer.Argument(help="Folder with recording.yaml, lens.yaml and the pictures.")],
+    lens_file: Annotated[Path | None, typer.Option("--lens", help="Lens file; none: lens.yaml of the folder.")] = None,
+    fit: Annotated[str, typer.Option(help=f"Offsets to find, with commas: {', '.join(OFFSETS)}.")] = ",".join(FITTED),
+    start: Annotated[Path | None, typer.Option(help="Mount file with what is known; none: no offsets.")] = None,
+    output: Annotated[Path, typer.Option(help="Mount file to write.")] = Path("camera_mount.yaml"),
+    apply: Annotated[bool, typer.Option("--apply", help="Write the robot's own mount file, too.")] = False,
+) -> None:
+    """Find how the camera sits on the head, from lines seen by a standing robot that looks round."""
+    names = [name.strip() for name in fit.split(",") if name.strip()]
+    for name in names:
+        if name not in OFFSETS:
+            raise unknown("offset", name, OFFSETS)
+    if not names:
+        raise BadInputError(f"--fit names no offset; expected some of {', '.join(OFFSETS)}.")
+    check_writable(output, "--output")
+    if apply:
+        check_writable(MOUNT_FILE, "--apply")
+    place, shots = read_recording(folder)
+    known = MountOffsets() if start is None else load_mount(start)
+    first = read_picture(folder / shots[0].picture) if shots else None
+    size = None if first is None else (first.shape[1], first.shape[0])
+    taken_by = read_lens(lens_file or folder / LENS, size)
+    calibration = MountCalibration(load_robot(), load_field(), taken_by, place, shots, known, names)
+    pictures = list(read_pictures([folder / shot.picture for shot in shots]).values())
+    console = Console()
+    with progress_bar("finding lines", 2 * len(shots), console) as advance:
+        found = calibration.fit(pictures, np.random.default_rng(0), advance)
+    report_mount(found, known, console)
+    provenance = [
+        f"Written by scripts/calibrate.py mount: {found.points} points of lines in {len(found.errors)} pictures",
+        f"lie {found.after * 1e3:.2f} mrad beside the lines (RMS); before it was {found.before * 1e3:.2f} mrad.",
+        "Standard deviations: "
+        + ", ".join(f"{name} {value:.5f}" for name, value in zip(names, found.spread, strict=True)),
+    ]
+    for path in (output, MOUNT_FILE) if apply else (output,):
+        write_mount(path, found.mount, provenance)
+    drawing = output.with_suffix(".png")
+    best = max(range(len(shots)), key=lambda index: calibration.visible(shots[index], found.mount, found.robot))
+    before = calibration.draw(pictures[best], shots[best], known, place)
+    after = calibration.draw(pictures[best], shots[best], found.mount, found.robot)
+    cv2.imwrite(str(drawing), beside(before, after))
+    console.print(f"Wrote {output} and {drawing} (before and after)", soft_wrap=True, highlight=False)
+
+
 def make_board(kind: str, squares: str, square: float) -> Board:
     """Return the board that the options describe."""
     if kind not in (CHESSBOARD, CHARUCO):
@@ -149,43 +215,6 @@ def make_board(kind: str, squares: str, square: float) -> Board:
     if not (columns.isdecimal() and rows.isdecimal()):
         raise BadInputError(f"--squares is {squares!r}; expected two numbers as in 9x7.")
     return Board(kind, int(columns), int(rows), square)
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder, or take an empty one."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if any(folder.iterdir()):
-            raise BadInputError(f"Folder {folder} is not empty; name a new one.")
-    except OSError as error:
-        raise BadInputError(f"Folder {folder} cannot be made: {error.strerror}.") from error
-
-
-def read_picture(path: Path) -> Picture:
-    """Return a picture, (height, width, 3) BGR."""
-    try:
-        content = np.frombuffer(path.read_bytes(), np.uint8)
-    except OSError as error:
-        raise BadInputError(f"Picture {path} cannot be read: {error.strerror}.") from error
-    picture = cv2.imdecode(content, cv2.IMREAD_COLOR) if content.size else None
-    if picture is None:
-        raise BadInputError(f"Picture {path} is none that can be read; expected PNG, JPEG or the like.")
-    return np.asarray(picture, np.uint8)
-
-
-def read_pictures(paths: list[Path]) -> dict[str, Picture]:
-    """Return pictures by the names that were given; all of one size."""
-    found: dict[str, Picture] = {}
-    for path in paths:
-        picture = read_picture(path)
-        first = next(iter(found.values()), picture)
-        if picture.shape != first.shape:
-            raise BadInputError(
-                f"Picture {path} has {picture.shape[1]} x {picture.shape[0]} px, {next(iter(found))} has"
-                f" {first.shape[1]} x {first.shape[0]} px; expected all of one size, from one camera."
-            )
-        found[str(path)] = picture
-    return found
 
 
 def find_boards(
@@ -228,11 +257,22 @@ def report_lens(best: LensFit, fits: list[LensFit], missing: dict[str, str], con
     console.print(f"{best.model}: {' '.join(f'{k:.5f}' for k in best.lens.distortion) or 'no coefficients'}")
 
 
-def track(items: Sequence[Item], text: str, console: Console) -> Iterator[Item]:
-    """Go through a list with a progress bar."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console) as bar:
-        yield from bar.track(items, description=text)
+def report_mount(found: MountFit, known: MountOffsets, console: Console) -> None:
+    """Print offsets with their spread, and how well each picture fits."""
+    table = Table("picture", "RMS [mrad]")
+    for name, error in found.errors.items():
+        table.add_row(name, f"{error * 1e3:.2f}")
+    console.print(table)
+    table = Table("offset", "before", "after", "+-", "unit")
+    for name, spread in zip(found.names, found.spread.tolist(), strict=True):
+        scale, unit = (1e3, "mm") if name == "height" else (math.degrees(1.0), "deg")
+        before, after = getattr(known, name), getattr(found.mount, name)
+        table.add_row(name, *(f"{value * scale:.3f}" for value in (before, after, spread)), unit)
+    console.print(table)
+    console.print(
+        f"Points lie {found.after * 1e3:.2f} mrad beside the lines (RMS); before it was {found.before * 1e3:.2f} mrad",
+        highlight=False,
+    )
 
 
 if __name__ == "__main__":
