@@ -8,12 +8,14 @@ if __name__ == "__main__":
     _environment.prepare()
 
 import math
+import re
 from pathlib import Path
 from typing import Annotated
 
 import cv2
 import numpy as np
 import typer
+import yaml
 from _calibration_io import Picture, make_folder, progress_bar, read_picture, read_pictures, told, track
 from rich.console import Console
 from rich.table import Table
@@ -25,14 +27,25 @@ from tulip_description.robot import load_robot
 from tulip_ros.errors import BadInputError, check_writable, unknown
 from tulip_vision.calibration.board_pictures import BoardCamera, PictureParameters, spots
 from tulip_vision.calibration.boards import CHARUCO, CHESSBOARD, Board, Corners
+from tulip_vision.calibration.colour_fit import (
+    ColourFit,
+    Rectangle,
+    check_labels,
+    draw_classes,
+    fit_colours,
+    segmentation_parameters,
+)
 from tulip_vision.calibration.lens_fit import COEFFICIENTS, FEWEST_PICTURES, LensFit, choose_model, fit_lens
 from tulip_vision.calibration.mount_fit import FITTED, MountCalibration, MountFit
 from tulip_vision.calibration.recording import LENS, read_recording, write_recording
 from tulip_vision.calibration.straighten import beside, draw_corners, straighten
+from tulip_vision.colour_file import PATH as COLOURS_FILE
+from tulip_vision.colour_file import ColourFile, read_colours, write_colours
 from tulip_vision.lens import Lens, head_camera_lens
 from tulip_vision.lens_file import read_lens, write_lens
 
 AUTO = "auto"
+CLICK = 7  # [px] edge of the square that a click labels
 
 app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True)
 
@@ -207,6 +220,48 @@ def mount(
     console.print(f"Wrote {output} and {drawing} (before and after)", soft_wrap=True, highlight=False)
 
 
+@app.command()
+@told
+def colours(
+    pictures: Annotated[list[Path], typer.Argument(help="Pictures of the field, from one camera in one hall.")],
+    label: Annotated[
+        list[str] | None,
+        typer.Option(help="CLASS:x,y (a click) or CLASS:x,y,w,h [px], CLASS@2 for the second picture; repeatable."),
+    ] = None,
+    labels_file: Annotated[
+        Path | None, typer.Option("--labels", help="YAML: picture: {class: [[x, y, w, h], ...]}.")
+    ] = None,
+    start: Annotated[Path, typer.Option(help="Colour file to start from.")] = COLOURS_FILE,
+    output: Annotated[Path, typer.Option(help="Colour file to write.")] = Path("colours.yaml"),
+    apply: Annotated[bool, typer.Option("--apply", help="Write vision's own colour file, too.")] = False,
+) -> None:
+    """Find the colour classes from labels, or without any from what the present classes find on the carpet."""
+    check_writable(output, "--output")
+    if apply:
+        check_writable(COLOURS_FILE, "--apply")
+    known = read_colours(start)
+    seen = read_pictures(pictures)
+    labels = read_labels(label or [], labels_file, seen)
+    check_labels(seen, labels)
+    console = Console()
+    with progress_bar("fitting colours", 1, console) as advance:
+        found = fit_colours(seen, labels, segmentation_parameters(known))
+        advance()
+    if not found.used:
+        raise BadInputError("No class was found on a carpet; label some, as in --label green:x,y,w,h.")
+    report_colours(found, known, console)
+    how = f"{sum(len(spots) for each in labels.values() for spots in each.values())} labels" if labels else "no labels"
+    for path in (output, COLOURS_FILE) if apply else (output,):
+        write_colours(path, found.colours, [f"Written by scripts/calibrate.py colours: {len(seen)} pictures, {how}."])
+    drawing = output.with_suffix(".png")
+    rows = [
+        beside(picture, draw_classes(picture, known), draw_classes(picture, found.colours))
+        for picture in list(seen.values())[:3]
+    ]
+    cv2.imwrite(str(drawing), np.concatenate(rows))
+    console.print(f"Wrote {output} and {drawing} (picture, before, after)", soft_wrap=True, highlight=False)
+
+
 def make_board(kind: str, squares: str, square: float) -> Board:
     """Return the board that the options describe."""
     if kind not in (CHESSBOARD, CHARUCO):
@@ -273,6 +328,65 @@ def report_mount(found: MountFit, known: MountOffsets, console: Console) -> None
         f"Points lie {found.after * 1e3:.2f} mrad beside the lines (RMS); before it was {found.before * 1e3:.2f} mrad",
         highlight=False,
     )
+
+
+def read_labels(
+    texts: list[str], file: Path | None, pictures: dict[str, Picture]
+) -> dict[str, dict[str, list[Rectangle]]]:
+    """Return rectangles by class by picture, from options and from a file."""
+    found: dict[str, dict[str, list[Rectangle]]] = {}
+    names = list(pictures)
+    for text in texts:
+        match = re.fullmatch(r"(\w+)(?:@(\d+))?:(\d+),(\d+)(?:,(\d+),(\d+))?", text)
+        if match is None:
+            raise BadInputError(f"--label is {text!r}; expected as in orange:412,280 or orange@2:400,270,12,12.")
+        number = int(match[2] or 1)
+        if not 1 <= number <= len(names):
+            raise BadInputError(f"--label {text} is of picture {number}; expected 1 to {len(names)}.")
+        x, y = int(match[3]), int(match[4])
+        spot = (x, y, int(match[5]), int(match[6])) if match[5] else click(x, y, pictures[names[number - 1]])
+        found.setdefault(names[number - 1], {}).setdefault(match[1], []).append(spot)
+    if file is not None:
+        try:
+            content = yaml.safe_load(file.read_text())
+            for name, classes in content.items():
+                matching = [each for each in names if each == name or Path(each).name == name] or [str(name)]
+                for colour, spots in classes.items():
+                    into = found.setdefault(matching[0], {}).setdefault(str(colour), [])
+                    into += [(int(x), int(y), int(w), int(h)) for x, y, w, h in spots]
+        except OSError as error:
+            raise BadInputError(f"--labels {file} cannot be read: {error.strerror}.") from error
+        except (yaml.YAMLError, UnicodeDecodeError, AttributeError, TypeError, ValueError) as error:
+            reason = " ".join(str(error).split())
+            raise BadInputError(
+                f"--labels {file} is not as expected, picture: {{class: [[x, y, w, h], ...]}}: {reason}."
+            ) from error
+    return found
+
+
+def click(x: int, y: int, picture: Picture) -> Rectangle:
+    """Return the square round a click, cut at the picture's edges; a click outside is left for the check of labels."""
+    height, width = picture.shape[:2]
+    if not (x < width and y < height):
+        return x, y, 1, 1
+    half = CLICK // 2
+    left, upper = max(x - half, 0), max(y - half, 0)
+    return left, upper, min(x + half, width - 1) - left + 1, min(y + half, height - 1) - upper + 1
+
+
+def report_colours(found: ColourFit, known: ColourFile, console: Console) -> None:
+    """Print the boxes before and after, and how many pixels are in them."""
+    table = Table("class", "made from [px]", "hue [deg]", "saturation", "value", "pixels before", "after")
+    for name, box in found.colours.boxes.items():
+        old = known.boxes[name]
+        cells = [
+            f"{box[side][0]:.3g} to {box[side][1]:.3g}"
+            + ("" if box[side] == old[side] else f" (was {old[side][0]:.3g} to {old[side][1]:.3g})")
+            for side in box
+        ]
+        used = str(found.used[name]) if name in found.used else "as it was"
+        table.add_row(name, used, *cells, str(found.before[name]), str(found.after[name]))
+    console.print(table)
 
 
 if __name__ == "__main__":
