@@ -114,6 +114,22 @@ def test_without_labels_the_classes_follow_the_light() -> None:
         assert after[name] > min(before[name], 0.95) - 0.02, (name, before, after)
 
 
+def test_without_labels_no_class_grows_into_other_things() -> None:
+    scenes = painted(CameraParameters(), seed=5, count=3)
+    # Brown boxes on the carpet, whose edges shade off into the orange of a ball: light that a ball may not follow.
+    pictures = {}
+    for index, (picture, _) in enumerate(scenes):
+        picture[300:420, 100:400] = np.linspace((20, 100, 230), (70, 85, 105), 300).astype(np.uint8)
+        pictures[str(index)] = picture
+    fit = fit_colours(pictures, {})
+    known = read_colours()
+    for name in CLASSES:
+        assert fit.after[name] <= 2.0 * fit.before[name] + 100, name
+        if name not in fit.used and name not in ("orange", "yellow", "cyan", "blue"):  # whose neighbours may trim them
+            assert fit.colours.boxes[name] == known.boxes[name]
+    assert fit.colours.boxes["orange"]["saturation"][0] >= known.boxes["orange"]["saturation"][0] - 0.11
+
+
 def test_labels_may_stand_in_a_file_and_other_classes_stay(tmp_path: Path) -> None:
     picture, areas = painted(BLUISH, seed=3, count=1)[0]
     path, labels, output = tmp_path / "p.png", tmp_path / "labels.yaml", tmp_path / "colours.yaml"

@@ -32,6 +32,8 @@ ROUNDS = 4
 REACH = 2  # [px] by which patches grow in a round
 SHARE = 0.02  # of the pixels at either end that may be another thing: edges, reflections
 HUE_MARGIN, SATURATION_MARGIN, VALUE_SHARE = 7.0, 0.10, 0.75  # [deg], -, of the least value: light differs by place
+MOST_SHIFT = 12.0  # [deg] beyond the bounds known before, without labels
+MOST_MORE = 2.0  # times the pixels of a class before, without labels
 MOST_GROWTH = 16.0  # [deg] beyond the hues that a class began with
 FEWEST = 12  # px of a class; fewer tell nothing of its spread
 SMALLEST_PATCH = 25  # px of a patch found without a label
@@ -121,7 +123,12 @@ def fit_colours(
             if labelled:
                 raise ColourFitError(f"the labels of {name} have {count} px; expected at least {FEWEST} px")
             continue
-        boxes[name], used[name] = _grow(seen, seeds, name)
+        box, pixels = _grow(seen, seeds, name)
+        if not labelled:
+            box = _near(box, boxes[name], name)
+            if sum(int(each.inside(box).sum()) for each in seen.values()) > MOST_MORE * before[name]:
+                continue  # it has grown into something else
+        boxes[name], used[name] = box, pixels
         if name == "green":
             _set_brightness(seen, boxes["green"], start.reference_brightness)
     _part(boxes, used)
@@ -223,7 +230,10 @@ def _found_mask(seen: _Seen, box: ColourBox, green: ColourBox, name: str) -> Mas
     points = cv2.findNonZero(carpet[0].astype(np.uint8)).reshape(-1, 1, 2)
     on_carpet = cv2.fillPoly(nothing.astype(np.uint8), [cv2.convexHull(points)], (1,)) != 0
     found = nothing
-    for patch in _patches(seen.inside(box) & on_carpet):
+    mask = seen.inside(box) & on_carpet
+    if name not in COLOURLESS:  # thin rims round other things are mixtures; lines are thin themselves
+        mask = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) != 0
+    for patch in _patches(mask):
         found = found | patch
     return found
 
@@ -308,6 +318,18 @@ def _limited(box: ColourBox, first: ColourBox, name: str) -> ColourBox:
     low = first.hue[0] + min(max(float(_turn(box.hue[0] - first.hue[0])), -MOST_GROWTH), 0.0)
     high = first.hue[1] + max(min(float(_turn(box.hue[1] - first.hue[1])), MOST_GROWTH), 0.0)
     return replace(box, hue=(low % 360.0, high % 360.0))
+
+
+def _near(box: ColourBox, known: ColourBox, name: str) -> ColourBox:
+    """Return a box that nobody has labelled, no paler, darker or further off in hue than the known one allows."""
+    if name in COLOURLESS:
+        return box
+    least = max(box.saturation[0], known.saturation[0] - SATURATION_MARGIN)
+    darkest = max(box.value[0], VALUE_SHARE * known.value[0])
+    low = max(float(_turn(box.hue[0] - known.hue[0])), -MOST_SHIFT)
+    high = min(float(_turn(box.hue[1] - known.hue[1])), MOST_SHIFT)
+    hue = ((known.hue[0] + low) % 360.0, (known.hue[1] + high) % 360.0)
+    return ColourBox(hue, (least, 1.0), (darkest, 1.0))
 
 
 def _part(boxes: dict[str, ColourBox], used: Mapping[str, int]) -> None:
