@@ -111,8 +111,12 @@ class Lens:
         """
         directions = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         x, y, z = directions.T
-        distance = np.sqrt(x * x + y * y + z * z)
-        visible = (z >= distance * self._least_cosine) & (distance > 1e-9)
+        aside = x * x + y * y
+        if self._largest_tangent is not None:
+            visible = (z > 1e-9) & (aside <= (z * self._largest_tangent) ** 2)
+        else:
+            distance = np.sqrt(aside + z * z)
+            visible = (z >= distance * self._least_cosine) & (distance > 1e-9)
         if visible.all():
             return self._to_pixels(self._model.flatten(directions))
         pixels = np.full((len(directions), 2), np.nan)
@@ -232,6 +236,11 @@ class Lens:
         return np.cos(angles[:, 0]), step * np.sin(angles[:, 0]) / moved.mean(axis=1)
 
     @cached_property
+    def _largest_tangent(self) -> float | None:
+        """Tangent of the largest angle; None if the lens sees beside itself, where a cosine must tell."""
+        return math.tan(self.largest_angle + 1e-12) if self.largest_angle < math.radians(89.0) else None
+
+    @cached_property
     def _least_cosine(self) -> float:
         # Rounding must not cost the last direction, which projects where `rays` came from.
         return math.cos(self.largest_angle) - 1e-12
@@ -239,9 +248,10 @@ class Lens:
     def _to_pixels(self, points: Array) -> Array:
         """Return (n, 2) pixels of (n, 2) points of the image plane at distance 1."""
         (fx, _, cx), (_, fy, cy), _ = self.camera_matrix.tolist()
-        points *= (fx, fy)
-        points += (cx, cy)
-        return points
+        pixels = np.empty(points.shape)
+        pixels[:, 0] = fx * points[:, 0] + cx
+        pixels[:, 1] = fy * points[:, 1] + cy
+        return pixels
 
 
 HEAD_CAMERA_FOCAL_LENGTH = 455.0

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import calibrate
@@ -215,3 +218,23 @@ def test_pictures_without_carpet_need_labels(tmp_path: Path, monkeypatch: pytest
     for name, words in (("grey.png", "No class was found on a carpet"), ("text.png", "is none that can be read")):
         code, text = run("colours", name)
         assert code == 2 and words in text, text
+
+
+def test_a_colour_file_that_cannot_be_used_is_told_in_one_line_by_every_script(tmp_path: Path) -> None:
+    (tmp_path / "colours.yaml").write_text("vision: {}")
+    code = (
+        "import _environment; _environment.prepare(); from pathlib import Path;"
+        f" from tulip_vision.colour_file import read_colours; read_colours(Path({str(tmp_path / 'colours.yaml')!r}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "TULIP_NO_VENV": "1"},
+        cwd=Path(calibrate.__file__).parent,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"error: {tmp_path / 'colours.yaml'} is no colour file")
