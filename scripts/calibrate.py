@@ -324,6 +324,12 @@ def report_mount(found: MountFit, known: MountOffsets, console: Console) -> None
         before, after = getattr(known, name), getattr(found.mount, name)
         table.add_row(name, *(f"{value * scale:.3f}" for value in (before, after, spread)), unit)
     console.print(table)
+    roll, pitch = (math.degrees(value) for value in found.lean)
+    console.print(
+        f"Beside that the trunk rolls {roll:.2f} deg and pitches {pitch:.2f} deg more than measured (bias of the IMU)",
+        soft_wrap=True,
+        highlight=False,
+    )
     console.print(
         f"Points lie {found.after * 1e3:.2f} mrad beside the lines (RMS); before it was {found.before * 1e3:.2f} mrad",
         highlight=False,

@@ -28,6 +28,7 @@ from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.field import Field
 from tulip_description.planar import Pose2D
 from tulip_description.robot import Robot
+from tulip_vision.calibration.field_lines import FieldLines
 from tulip_vision.calibration.recording import Shot
 from tulip_vision.lens import Lens
 from tulip_vision.line_points import find_line_points
@@ -89,6 +90,7 @@ class MountFit:
         names: Of the offsets that were found; the others are as given.
         covariance: (n, n) of these, [rad^2], [m^2].
         robot: Where the robot stood, as the lines tell.
+        lean: By how much the trunk's roll and pitch are more than the robot measured [rad].
         before, after: Root mean square angle between points and lines with the offsets given and found [rad].
         errors: The same after the fit, by picture; pictures without line points are missing.
         points: Number of points used.
@@ -98,6 +100,7 @@ class MountFit:
     names: tuple[str, ...]
     covariance: Array
     robot: Pose2D
+    lean: tuple[float, float]
     before: float
     after: float
     errors: Mapping[str, float]
@@ -118,42 +121,6 @@ def _soft(squares: Array) -> Array:
     loss = np.stack([np.log1p(squares), 1.0 / (1.0 + squares), -1.0 / (1.0 + squares) ** 2])
     loss[:, -PRIORS:] = np.stack([squares[-PRIORS:], np.ones(PRIORS), np.zeros(PRIORS)])
     return loss
-
-
-class FieldLines:
-    """The nearest places on the lines of a field."""
-
-    def __init__(self, field: Field) -> None:
-        self._starts = np.array([line.start for line in field.line_segments])
-        self._along = np.array([line.end for line in field.line_segments]) - self._starts
-        self._circle = field.centre_circle
-
-    def nearest(self, points: Array) -> Array:
-        """Return (n, 2) places on the middles of the lines nearest to (n, 2) points in map [m]."""
-        offsets = points[:, None] - self._starts
-        share = np.clip((offsets * self._along).sum(axis=2) / (self._along**2).sum(axis=1), 0.0, 1.0)
-        feet = self._starts + share[..., None] * self._along
-        distances = np.linalg.norm(feet - points[:, None], axis=2)
-        best = distances.argmin(axis=1)
-        rows = np.arange(len(points))
-        found: Array = feet[rows, best]
-        middle = np.array([self._circle.x, self._circle.y])
-        out = points - middle
-        length = np.maximum(np.linalg.norm(out, axis=1), 1e-9)
-        on_circle = np.abs(length - self._circle.radius) < distances[rows, best]
-        found[on_circle] = middle + (out * (self._circle.radius / length)[:, None])[on_circle]
-        return found
-
-    def outlines(self) -> list[Array]:
-        """Return each line as (n, 2) points close together, for drawing [m]."""
-        drawn = [
-            start + np.linspace(0.0, 1.0, 120)[:, None] * along
-            for start, along in zip(self._starts, self._along, strict=True)
-        ]
-        turn = np.linspace(0.0, 2.0 * math.pi, 120)
-        radius = self._circle.radius
-        drawn.append(np.stack([self._circle.x + radius * np.cos(turn), self._circle.y + radius * np.sin(turn)], axis=1))
-        return drawn
 
 
 def line_pixels(picture: Picture, lens: Lens, camera_in_footprint: Array, rng: np.random.Generator) -> Array:
@@ -362,12 +329,13 @@ class MountCalibration:
             if (on_line & (names == index)).any()
         }
         before = np.linalg.norm(self._misses(rays, known), axis=1)[on_line]
-        x, y, yaw = unknowns[count : count + 3].tolist()
+        x, y, yaw, roll, pitch = unknowns[count:].tolist()
         return MountFit(
             self._mount(unknowns),
             self._names,
             covariance[:count, :count],
             Pose2D(self._place.x + x, self._place.y + y, self._place.yaw + yaw),
+            (roll, pitch),
             math.sqrt(float((before**2).mean())),
             math.sqrt(float(squares[on_line].mean())),
             errors,
