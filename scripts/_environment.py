@@ -92,8 +92,8 @@ def prepare(extras: Sequence[str] = ()) -> None:
 
 
 def tell(kind: Type[BaseException], error: BaseException, trace: Optional[TracebackType]) -> None:  # noqa: UP006, UP045
-    """Say in one line what is wrong with gait.yaml, which is read by an import, where no script can catch it."""
-    if kind.__name__ == "GaitFileError":
+    """Say in one line what is wrong with gait.yaml or colours.yaml: imports read them, where no script can catch it."""
+    if kind.__name__ in ("GaitFileError", "ColourFileError"):
         sys.stderr.write(f"error: {error}\n")
         sys.stderr.flush()
         os._exit(EXIT)  # after the hook, Python would end with 1

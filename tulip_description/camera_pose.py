@@ -7,15 +7,24 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tulip_description.camera_mount import MountOffsets
 from tulip_description.model import OPTICAL_ROTATION
 from tulip_description.quaternion import quaternion_matrix
 from tulip_description.robot import Robot
 
 Array = NDArray[np.float64]
 
+AS_DRAWN = MountOffsets()
+"""The camera sits exactly as robot.yaml says."""
+
 
 def camera_in_footprint(
-    robot: Robot, base_height: float, base_orientation_xyzw: ArrayLike, pan: float, tilt: float
+    robot: Robot,
+    base_height: float,
+    base_orientation_xyzw: ArrayLike,
+    pan: float,
+    tilt: float,
+    mount: MountOffsets = AS_DRAWN,
 ) -> Array:
     """Return the (4, 4) transform of camera_optical_frame in base_footprint.
 
@@ -25,6 +34,7 @@ def camera_in_footprint(
         base_orientation_xyzw: (4,) unit quaternion of base_link in any level frame; its yaw does not matter.
         pan: Angle of head_pan [rad].
         tilt: Angle of head_tilt, positive looks down [rad].
+        mount: How the camera sits on the head, beside what the robot file says.
 
     Raises:
         ValueError: if the robot has no head or the quaternion is not of length one.
@@ -33,15 +43,18 @@ def camera_in_footprint(
         raise ValueError(f"variant {robot.variant!r} has no camera; expected the playing variant")
     rotation = _level_rotation(base_orientation_xyzw)
     neck, head = robot.joint("head_pan"), robot.joint("head_tilt")
+    pan, tilt = pan + mount.pan, tilt + mount.tilt
     cp, sp, ct, st = math.cos(pan), math.sin(pan), math.cos(tilt), math.sin(tilt)
     head_in_neck = np.array([[ct, 0.0, st], [0.0, 1.0, 0.0], [-st, 0.0, ct]])
     neck_in_base = np.array([[cp, -sp, 0.0], [sp, cp, 0.0], [0.0, 0.0, 1.0]])
     head_in_base = neck_in_base @ head_in_neck
     position = (
-        np.array(neck.origin) + neck_in_base @ np.array(head.origin) + head_in_base @ np.array(robot.camera.origin)
+        np.array(neck.origin)
+        + neck_in_base @ np.array(head.origin)
+        + head_in_base @ (np.array(robot.camera.origin) + np.array((0.0, 0.0, mount.height)))
     )
     transform = np.eye(4)
-    transform[:3, :3] = rotation @ head_in_base @ OPTICAL_ROTATION
+    transform[:3, :3] = rotation @ head_in_base @ mount.rotation @ OPTICAL_ROTATION
     transform[:3, 3] = rotation @ position
     transform[2, 3] += base_height
     return transform

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_description.camera_mount import MountOffsets
 from tulip_description.field import Field
 from tulip_description.keeper import TEAM_COLOURS
 from tulip_description.robot import Robot
@@ -64,6 +65,9 @@ class CameraParameters:
         team_colour: Of the robot's own marker.
         keeper_colour: Of the keeper's markers.
         hall_seed: Seeds the clutter on the walls and the blotches of carpet and floor.
+        mount_angle: Roll, pitch and yaw of the camera on the head err by up to this [rad].
+        mount_height: Its height on the head errs by up to this [m].
+        mount_seed: Seeds these errors.
     """
 
     brightness: float = 1.0
@@ -80,6 +84,9 @@ class CameraParameters:
     team_colour: str = "cyan"
     keeper_colour: str = "magenta"
     hall_seed: int = 2013
+    mount_angle: float = 0.0  # a camera screwed on by hand is off by 1 or 2 deg
+    mount_height: float = 0.0
+    mount_seed: int = 2013
 
     def __post_init__(self) -> None:
         """Check the values.
@@ -99,10 +106,22 @@ class CameraParameters:
             value = getattr(self, name)
             if not 0.0 <= value <= most:
                 raise ValueError(f"{name} is {value} {unit}; expected 0 to {most:g} {unit}")
+        if not (0.0 <= self.mount_angle <= 0.3 and 0.0 <= self.mount_height <= 0.1):
+            raise ValueError(
+                f"mount_angle is {self.mount_angle} rad, mount_height {self.mount_height} m;"
+                " expected 0 to 0.3 rad and 0 to 0.1 m"
+            )
         for name in ("team_colour", "keeper_colour"):
             value = getattr(self, name)
             if value not in TEAM_COLOURS:
                 raise ValueError(f"{name} is {value!r}; expected {' or '.join(TEAM_COLOURS)}")
+
+
+def draw_mount(parameters: CameraParameters) -> MountOffsets:
+    """Return how the camera really sits on the head, drawn once by its seed."""
+    roll, pitch, yaw, height = np.random.default_rng(parameters.mount_seed).uniform(-1.0, 1.0, 4).tolist()
+    angle = parameters.mount_angle
+    return MountOffsets(roll * angle, pitch * angle, yaw * angle, height * parameters.mount_height)
 
 
 class CameraRenderer:
@@ -120,7 +139,7 @@ class CameraRenderer:
         rng = np.random.default_rng(parameters.hall_seed)
         self._parameters = parameters
         self._field = field
-        self._body = Body(robot, parameters.team_colour)
+        self._body = Body(robot, parameters.team_colour, mount=draw_mount(parameters))
         self._view = View(lens)
         self._backdrop = Backdrop(
             lens,
@@ -250,7 +269,8 @@ def _sensor_gain(lens: Lens, parameters: CameraParameters) -> Bytes:
     """Return (H, W, 3): vignetting and white balance, 255 for the brightest channel in the middle."""
     cosine = lens.ray_table()[..., 2].astype(np.float64)
     # Grows with the square of the angle's sine, so that the corners lose the stated share.
-    loss = parameters.vignetting * (1.0 - cosine**2) / float((1.0 - cosine**2).max())
+    loss = parameters.vignetting * (1.0 - cosine**2) / float(np.nanmax(1.0 - cosine**2))
+    loss[np.isnan(loss)] = 1.0  # no light falls into the corners round a fisheye's picture
     balance = np.array([parameters.blue_gain, parameters.green_gain, parameters.red_gain])
     gain = (1.0 - loss)[..., None] * (balance / balance.max())
     return np.asarray((255.0 * gain).round(), np.uint8)

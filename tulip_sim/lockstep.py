@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_description.camera_mount import load_mount
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.field import Field, load_field
 from tulip_description.robot import Robot, load_robot
@@ -85,9 +87,7 @@ class Lockstep:
         self.referee = Referee(settings.referee, robot_field)
         eyes = EyesParameters(settings.camera, settings.vision, seed)
         self._eyes: Eyes = EyesBeside(eyes) if eyes_beside else OwnEyes(eyes)
-        self._poses = PoseBuffer(
-            PoseBufferParameters(), lambda height, turn, pan, tilt: camera_in_footprint(robot, height, turn, pan, tilt)
-        )
+        self._poses = PoseBuffer(PoseBufferParameters(), partial(camera_in_footprint, robot, mount=load_mount()))
         self.world_model = WorldModel(settings.worldmodel, robot_field, scenario.robot)
         self.motion = Motion(settings.motion, robot)
         self.head = HeadMovement(settings.head, robot)

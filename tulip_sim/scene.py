@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_description.camera_mount import MountOffsets
 from tulip_description.field import Field, Goal
 from tulip_description.keeper import keeper_parts
 from tulip_description.planar import Pose2D
@@ -169,13 +170,20 @@ def _steps(low: float, high: float) -> Sequence[float]:
 class Body:
     """The robot's own body: where its links and its camera are for given joint angles."""
 
-    def __init__(self, robot: Robot, team_colour: str, unseen: Collection[str] = UNSEEN) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        team_colour: str,
+        unseen: Collection[str] = UNSEEN,
+        mount: MountOffsets | None = None,
+    ) -> None:
         """Collect the boxes.
 
         Args:
             robot: A robot with a camera.
             team_colour: Of its marker.
             unseen: Links whose boxes are left out.
+            mount: How the camera really sits on the head; none: as drawn.
 
         Raises:
             ValueError: if the robot has no camera.
@@ -184,6 +192,7 @@ class Body:
             raise ValueError(f"variant {robot.variant!r} has no camera; expected the playing variant")
         self._robot = robot
         self._camera = robot.camera
+        self._mount = mount or MountOffsets()
         self._soles = robot.soles
         columns = {joint.name: column for column, joint in enumerate(robot.moving)}
         self._columns = [columns.get(joint.name) for joint in robot.joints]
@@ -218,7 +227,8 @@ class Body:
     def camera_in_map(self, links: dict[str, Array]) -> Array:
         """Return the (4, 4) transform of camera_optical_frame in map, from the links' transforms."""
         optical = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-        optical[:3, 3] = self._camera.origin
+        optical[:3, :3] = self._mount.rotation @ optical[:3, :3]
+        optical[:3, 3] = np.array(self._camera.origin) + np.array((0.0, 0.0, self._mount.height))
         camera: Array = links[self._camera.link] @ optical
         return camera
 

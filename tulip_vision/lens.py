@@ -11,22 +11,14 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tulip_vision.lens_models import COEFFICIENTS, EQUIDISTANT, PLUMB_BOB, make_model
+
 Array = NDArray[np.float64]
 
-PLUMB_BOB = "plumb_bob"
-"""Brown-Conrady: k1, k2, p1, p2, k3 (4, 5 or 8 numbers: 8 is ROS's rational_polynomial)."""
-FISHEYE = "equidistant"
-"""Kannala-Brandt: theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)."""
-COEFFICIENTS = {PLUMB_BOB: (4, 5, 8), FISHEYE: (4,)}
-
-MODEL_NAMES = {"rational_polynomial": PLUMB_BOB, "fisheye": FISHEYE}  # other names in use for the same two models
-
-EXACT = (cv2.TERM_CRITERIA_MAX_ITER + cv2.TERM_CRITERIA_EPS, 40, 1e-9)
-"""Stopping rule of the inverse. OpenCV's default, five rounds, errs up to 0.32 px at the picture's edge."""
+MODEL_NAMES = {"rational_polynomial": PLUMB_BOB, "fisheye": EQUIDISTANT}  # other names in use for the same two models
 
 
 class Lens:
@@ -36,7 +28,8 @@ class Lens:
         width, height: Of the picture [px].
         camera_matrix: (3, 3) fx, fy, cx, cy [px] in their usual places.
         distortion: (n,) coefficients of the model.
-        model: "plumb_bob" or "equidistant".
+        model: "plumb_bob", "equidistant", "equisolid" or "rectilinear"; see `lens_models` for what they mean.
+        largest_angle: To the optical axis, up to which the lens sees [rad].
     """
 
     def __init__(
@@ -48,8 +41,9 @@ class Lens:
             width: Of the picture [px].
             height: Of the picture [px].
             camera_matrix: (3, 3) [px].
-            distortion: (n,) coefficients; n is 4, 5 or 8 for plumb_bob and 4 for equidistant.
-            model: "plumb_bob" (or "rational_polynomial") or "equidistant" (or "fisheye").
+            distortion: (n,) coefficients; n is 4, 5 or 8 for plumb_bob, 4 for equidistant, and 4 or 0 for equisolid
+                and rectilinear.
+            model: "plumb_bob" (or "rational_polynomial"), "equidistant" (or "fisheye"), "equisolid", "rectilinear".
 
         Raises:
             ValueError: if a shape, a number or the model is not one of these.
@@ -75,6 +69,8 @@ class Lens:
         self.camera_matrix = matrix
         self.distortion = coefficients
         self.model = model
+        self._model = make_model(model, coefficients)
+        self.largest_angle = self._model.largest_angle
         self._coarse_ray_tables: dict[int, NDArray[np.float32]] = {}
 
     @classmethod
@@ -110,17 +106,22 @@ class Lens:
             points: (n, 3) points or directions in camera_optical_frame, any length.
 
         Returns:
-            (n, 2) pixels; NaN for points that are not in front of the camera (z <= 0), and for those so far
-            outside the picture that the distortion folds back on itself.
+            (n, 2) pixels; NaN for points further from the optical axis than the lens sees: behind the camera,
+            or so far outside the picture that the distortion folds back on itself.
         """
         directions = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         x, y, z = directions.T
-        visible = (z > 1e-9) & (x * x + y * y <= (z * self._largest_tangent) ** 2)
+        aside = x * x + y * y
+        if self._largest_tangent is not None:
+            visible = (z > 1e-9) & (aside <= (z * self._largest_tangent) ** 2)
+        else:
+            distance = np.sqrt(aside + z * z)
+            visible = (z >= distance * self._least_cosine) & (distance > 1e-9)
         if visible.all():
-            return self._distort(directions)
+            return self._to_pixels(self._model.flatten(directions))
         pixels = np.full((len(directions), 2), np.nan)
         if visible.any():
-            pixels[visible] = self._distort(directions[visible])
+            pixels[visible] = self._to_pixels(self._model.flatten(directions[visible]))
         return pixels
 
     def rays(self, pixels: ArrayLike) -> Array:
@@ -130,18 +131,12 @@ class Lens:
             pixels: (n, 2), inside the picture or close to it.
 
         Returns:
-            (n, 3) unit vectors in camera_optical_frame.
+            (n, 3) unit vectors in camera_optical_frame; NaN at pixels to which the lens sends no light, as in the black
+            corners round a fisheye's picture.
         """
-        points = np.ascontiguousarray(np.asarray(pixels, dtype=np.float64).reshape(-1, 1, 2))
-        if len(points) == 0:
-            return np.empty((0, 3))
-        if self.model == FISHEYE:
-            flat = cv2.fisheye.undistortPoints(points, self.camera_matrix, self.distortion, criteria=EXACT)
-        else:
-            flat = cv2.undistortPoints(points, self.camera_matrix, self.distortion, criteria=EXACT)
-        directions = np.concatenate([flat.reshape(-1, 2), np.ones((len(points), 1))], axis=1)
-        unit: Array = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-        return unit
+        points = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        (fx, _, cx), (_, fy, cy), _ = self.camera_matrix.tolist()
+        return self._model.unflatten((points - (cx, cy)) / (fx, fy))
 
     def rays_inside(self, pixels: Array) -> Array:
         """Return the same as `rays` for (n, 2) pixels inside the picture, read from the table: much faster.
@@ -230,7 +225,7 @@ class Lens:
     @cached_property
     def _angles_per_pixel(self) -> tuple[Array, Array]:
         """Cosines of angles to the optical axis, rising, and what a pixel sees there, the mean all round it [rad]."""
-        angles = np.linspace(math.atan(self._largest_tangent), 0.005, 256)[1:, None]
+        angles = np.linspace(self.largest_angle, 0.005, 256)[1:, None]
         turn = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
         step = 1e-3  # [rad] small enough to be linear, large enough for the projection's rounding
         before, after = (
@@ -241,42 +236,22 @@ class Lens:
         return np.cos(angles[:, 0]), step * np.sin(angles[:, 0]) / moved.mean(axis=1)
 
     @cached_property
-    def _largest_tangent(self) -> float:
-        """Tangent of the angle to the optical axis up to which the distortion grows monotonically."""
-        angles = np.linspace(0.0, math.radians(88.0), 881)
-        if self.model == FISHEYE:
-            coefficients = np.array([1.0, *self.distortion])
-            radii = sum(k * angles ** (2 * power + 1) for power, k in enumerate(coefficients))
-        else:
-            radii = np.tan(angles) * self._radial(np.tan(angles) ** 2)
-        falling = np.flatnonzero(np.diff(radii) <= 0.0)
-        return math.tan(angles[falling[0] if falling.size else -1])
+    def _largest_tangent(self) -> float | None:
+        """Tangent of the largest angle; None if the lens sees beside itself, where a cosine must tell."""
+        return math.tan(self.largest_angle + 1e-12) if self.largest_angle < math.radians(89.0) else None
 
-    def _distort(self, directions: Array) -> Array:
-        """Return (n, 2) pixels of (n, 3) points that are in front of the camera."""
-        if self.model == FISHEYE:
-            points, still = np.ascontiguousarray(directions).reshape(-1, 1, 3), np.zeros(3)
-            seen, _ = cv2.fisheye.projectPoints(points, still, still, self.camera_matrix, self.distortion)
-            return np.asarray(seen, dtype=np.float64).reshape(-1, 2)
-        # cv2.projectPoints gives the same, but works out all derivatives too, in ten times the time.
-        x, y = directions[:, 0] / directions[:, 2], directions[:, 1] / directions[:, 2]
-        xx, yy, xy = x * x, y * y, 2.0 * x * y
-        squared = xx + yy
-        radial = self._radial(squared)
+    @cached_property
+    def _least_cosine(self) -> float:
+        # Rounding must not cost the last direction, which projects where `rays` came from.
+        return math.cos(self.largest_angle) - 1e-12
+
+    def _to_pixels(self, points: Array) -> Array:
+        """Return (n, 2) pixels of (n, 2) points of the image plane at distance 1."""
         (fx, _, cx), (_, fy, cy), _ = self.camera_matrix.tolist()
-        p1, p2 = self.distortion.tolist()[2:4]
-        pixels = np.empty((len(directions), 2))
-        pixels[:, 0] = fx * (x * radial + p1 * xy + p2 * (squared + 2.0 * xx)) + cx
-        pixels[:, 1] = fy * (y * radial + p1 * (squared + 2.0 * yy) + p2 * xy) + cy
+        pixels = np.empty(points.shape)
+        pixels[:, 0] = fx * points[:, 0] + cx
+        pixels[:, 1] = fy * points[:, 1] + cy
         return pixels
-
-    def _radial(self, squared: Array) -> Array:
-        """Return (n,) by how much plumb_bob stretches the distance from the optical axis, given its square at z = 1."""
-        k = [*self.distortion.tolist(), 0.0, 0.0, 0.0, 0.0][:8]
-        stretch: Array = 1.0 + squared * (k[0] + squared * (k[1] + squared * k[4]))
-        if any(k[5:]):
-            stretch = stretch / (1.0 + squared * (k[5] + squared * (k[6] + squared * k[7])))
-        return stretch
 
 
 HEAD_CAMERA_FOCAL_LENGTH = 455.0

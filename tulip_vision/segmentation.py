@@ -16,9 +16,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_vision.colour_file import PATH, ColourFile, ColourFileError, read_colours
 from tulip_vision.view import Array, Mask, View
 
 Picture = NDArray[np.uint8]
+
+
+LEAST_COSINE = 0.1
+"""Of the angle to the optical axis, 84 deg, up to which the carpet's outline is looked for."""
 
 
 class Colour(IntFlag):
@@ -61,18 +66,32 @@ class ColourBox:
                 raise ValueError(f"{name} is {bounds}; expected lower <= upper, both from 0 to 1")
 
 
+DEFAULTS = read_colours()
+"""What colours.yaml says; a file that cannot be used ends the import with a ColourFileError."""
+
+
+def _boxes(content: ColourFile) -> dict[str, ColourBox]:
+    try:
+        return {name: ColourBox(**box) for name, box in content.boxes.items()}
+    except ValueError as error:
+        raise ColourFileError(f"{PATH}: {error}") from None
+
+
+BOXES = _boxes(DEFAULTS)
+
+
 @dataclass(frozen=True)
 class ColourBoxes:
-    """The box of each colour class: hues of the rules of 2013, widened to what pictures of that time show."""
+    """The box of each colour class; the defaults are those of colours.yaml."""
 
-    green: ColourBox = ColourBox((68.0, 170.0), (0.25, 1.0), (0.12, 1.0))  # 68: yellowish carpets
-    white: ColourBox = ColourBox((0.0, 360.0), (0.0, 0.28), (0.64, 1.0))  # a grey floor is at 0.5
-    orange: ColourBox = ColourBox((350.0, 38.0), (0.52, 1.0), (0.28, 1.0))
-    yellow: ColourBox = ColourBox((41.0, 66.0), (0.42, 1.0), (0.30, 1.0))
-    blue: ColourBox = ColourBox((204.0, 250.0), (0.45, 1.0), (0.18, 1.0))
-    cyan: ColourBox = ColourBox((172.0, 203.0), (0.35, 1.0), (0.28, 1.0))
-    magenta: ColourBox = ColourBox((285.0, 346.0), (0.32, 1.0), (0.28, 1.0))
-    dark: ColourBox = ColourBox((0.0, 360.0), (0.0, 1.0), (0.0, 0.22))
+    green: ColourBox = BOXES["green"]
+    white: ColourBox = BOXES["white"]
+    orange: ColourBox = BOXES["orange"]
+    yellow: ColourBox = BOXES["yellow"]
+    blue: ColourBox = BOXES["blue"]
+    cyan: ColourBox = BOXES["cyan"]
+    magenta: ColourBox = BOXES["magenta"]
+    dark: ColourBox = BOXES["dark"]
 
     def of(self, colour: Colour) -> ColourBox:
         """Return the box of one class."""
@@ -96,7 +115,7 @@ class SegmentationParameters:
     """
 
     colours: ColourBoxes = ColourBoxes()
-    reference_brightness: float = 0.50
+    reference_brightness: float = DEFAULTS.reference_brightness
     brightness_step: float = 1.25
     outline_step: int = 8
     outline_run: int = 3
@@ -241,7 +260,8 @@ class Segmenter:
         rows = len(coarse)
         rays = view.lens.ray_table()
         lowest = view.height / math.hypot(view.height, parameters.farthest)  # sine of the angle below the horizon
-        below = view.coarse_sines(step) < -lowest
+        # What a wide lens sees beside or behind itself has no place on that plane.
+        below = (view.coarse_sines(step) < -lowest) & (view.lens.coarse_ray_table(step)[..., 2] > LEAST_COSINE)
         # Thick lines divide runs, so white is part of them; but a grey floor counts as white now and then, and so
         # white joins no parts, and the carpet's edge itself is green.
         carpet = _large_parts(belongs(coarse, Colour.GREEN | Colour.ORANGE) & below)

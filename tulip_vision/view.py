@@ -116,7 +116,8 @@ class View:
     @cached_property
     def lowest_elevation(self) -> float:
         """Lowest elevation that the lower edge of the picture shows [rad]."""
-        lowest = float((self.lens.ray_table()[-1].astype(np.float64) @ self.rotation[2]).min())
+        seen = self.lens.ray_table()[-1].astype(np.float64) @ self.rotation[2]
+        lowest = float(np.fmin.reduce(seen))  # past the black corners of a fisheye's picture, which see nothing
         return math.asin(max(min(lowest, 1.0), -1.0))
 
     @property

@@ -9,9 +9,11 @@ import cv2
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image, JointState
 
+from tulip_description.camera_mount import MountFileError, load_mount
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.robot import HEAD_JOINTS, load_robot
 from tulip_ros import topics
+from tulip_ros.errors import BadInputError
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.time import stamp_of
 from tulip_vision.messages import features_to_message, lens_from_message, picture_from_message, picture_to_message
@@ -35,6 +37,10 @@ class VisionNode(ComponentNode):
         cv2.setNumThreads(1)  # the robot's other nodes need the other cores
         self._settings = self.load(VisionParameters())
         self._robot = load_robot()
+        try:
+            self._mount = load_mount()
+        except MountFileError as error:
+            raise BadInputError(str(error)) from None
         self._vision: Vision | None = None
         self.begin_anew()
         self._features = self.sender(topics.FEATURES)
@@ -46,7 +52,7 @@ class VisionNode(ComponentNode):
 
     def begin_anew(self) -> None:
         """Forget poses, waiting pictures and what was seen; the lens stays."""
-        self._poses = PoseBuffer(PoseBufferParameters(), partial(camera_in_footprint, self._robot))
+        self._poses = PoseBuffer(PoseBufferParameters(), partial(camera_in_footprint, self._robot, mount=self._mount))
         self._pictures: deque[Image] = deque()
         if self._vision is not None:
             self._vision = Vision(self._settings, self._vision.lens)
