@@ -91,22 +91,22 @@ class PlumbBob:
         radius = np.hypot(points[:, 0], points[:, 1])
         start = np.interp(radius, self._radii, self._tangents)
         flat = points * (start / np.where(radius > 0.0, radius, 1.0))[:, None]
-        for _ in range(NEWTON_STEPS):
-            x, y = flat.T
-            squared = x * x + y * y
-            radial = self._stretch(squared)
-            error_x = x * radial + 2.0 * self._p1 * x * y + self._p2 * (squared + 2.0 * x * x) - points[:, 0]
-            error_y = y * radial + self._p1 * (squared + 2.0 * y * y) + 2.0 * self._p2 * x * y - points[:, 1]
-            if not max(np.abs(error_x).max(initial=0.0), np.abs(error_y).max(initial=0.0)) > CONVERGED:
-                break
-            along_x, across, along_y = self._derivatives(x, y)
-            with np.errstate(divide="ignore", invalid="ignore"):
+        # Points that no direction reaches run away; they become NaN below.
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            for _ in range(NEWTON_STEPS):
+                x, y = flat.T
+                squared = x * x + y * y
+                radial = self._stretch(squared)
+                error_x = x * radial + 2.0 * self._p1 * x * y + self._p2 * (squared + 2.0 * x * x) - points[:, 0]
+                error_y = y * radial + self._p1 * (squared + 2.0 * y * y) + 2.0 * self._p2 * x * y - points[:, 1]
+                if not max(np.abs(error_x).max(initial=0.0), np.abs(error_y).max(initial=0.0)) > CONVERGED:
+                    break
+                along_x, across, along_y = self._derivatives(x, y)
                 share = 1.0 / (along_x * along_y - across * across)
                 step_x = (along_y * error_x - across * error_y) * share
                 step_y = (along_x * error_y - across * error_x) * share
-            flat = flat - np.stack([step_x, step_y], axis=1)
-        tangent = np.hypot(flat[:, 0], flat[:, 1])
-        with np.errstate(invalid="ignore"):
+                flat = flat - np.stack([step_x, step_y], axis=1)
+            tangent = np.hypot(flat[:, 0], flat[:, 1])
             outside = ~((tangent <= self._tangents[-1]) & (np.maximum(np.abs(error_x), np.abs(error_y)) < 1e-9))
         directions = np.concatenate([flat, np.ones((len(flat), 1))], axis=1)
         directions[outside] = np.nan

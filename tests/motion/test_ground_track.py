@@ -34,7 +34,9 @@ def seen(
         transform[:2, :2], transform[:2, 3] = sole.rotation(), (sole.x, sole.y)
     none, legs = np.zeros(3), np.zeros(12)
     position = np.array([base.x, base.y, 1.05])
-    return Estimate(position, np.eye(3), none, none, legs, legs, none, none, transforms, rates, np.zeros(2), loads, 0.0)
+    return Estimate(
+        position, np.eye(3), none, none, legs, legs, none, none, (0.0, 0.0), transforms, rates, np.zeros(2), loads, 0.0
+    )
 
 
 def turned_about(point: tuple[float, float], angle: float, pose: Pose2D) -> Pose2D:

@@ -120,7 +120,9 @@ def test_the_lead_is_the_same_time_in_short_and_long_steps(ticks: int) -> None:
     law.learn(memory, Side.LEFT, np.arange(ticks) / ticks, np.zeros((ticks, 12)), feedback, None)
     nodes = memory.shape[1]
     found = (np.flatnonzero(memory[0, :, 3]) + 0.5) / nodes * ticks  # [ticks] where the torque will act
-    assert np.mean(found) == pytest.approx(peak - WAVEFORM.learning_lead / DT, abs=0.7)  # half a node and half a tick
+    assert np.mean(found) == pytest.approx(
+        peak - WAVEFORM.learning_lead / DT, abs=0.5 * ticks / nodes + 0.5
+    )  # half a node and a tick's half
 
 
 def test_smoothing_keeps_constants_and_shifts_nothing() -> None:
