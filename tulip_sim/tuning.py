@@ -39,7 +39,7 @@ SPACE: dict[str, tuple[float, float]] = {
     "double_support_time": (0.03, 0.12),  # [s]
     "first_shift_time": (0.3, 0.8),  # [s]
     "stop_shift_time": (0.3, 0.9),  # [s]
-    "stance_width": (0.20, 0.30),  # [m] from soles 50 mm apart to the hips' width
+    "stance_width": (0.20, 0.285),  # [m] from soles 50 mm apart; wider, legs reach less far sideways and to a ball
     "stance_narrowing": (0.0, 0.1),  # [m/(m/s)]
     "swing_height": (0.03, 0.06),  # [m]
     "landing_speed": (0.05, 0.3),  # [m/s]
