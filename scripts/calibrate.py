@@ -72,7 +72,7 @@ def lens(
         raise unknown("lens model", model, [AUTO, *COEFFICIENTS])
     check_writable(output, "--output")
     if len(pictures) < FEWEST_PICTURES:
-        raise BadInputError(f"{len(pictures)} pictures are given; expected at least {FEWEST_PICTURES}.")
+        raise BadInputError(f"too few pictures, {len(pictures)}; expected at least {FEWEST_PICTURES}.")
     seen = read_pictures(pictures)
     console = Console()
     size, corners = find_boards(seen, board, console)

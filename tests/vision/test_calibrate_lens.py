@@ -133,7 +133,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["lens", "a.png"], "1 pictures are given; expected at least 4"),
+        (["lens", "a.png"], "too few pictures, 1; expected at least 4"),
         (["lens", "a.png", "b.png", "c.png", "d.png"], "was found in 0 of 4 pictures"),
         (["lens", "a.png", "b.png", "c.png", "e.png"], "e.png has 320 x 240 px, a.png has 640 x 480 px"),
         (["lens", "a.png", "b.png", "c.png", "text.png"], "text.png is none that can be read"),
