@@ -276,11 +276,16 @@ class Motion:
         self._shift = (self._ground.position[0] - x, self._ground.position[1] - y)
         # While it walks, the robot minds where its body is, and steps there; else, how it stands on its feet.
         if self._gait is None:
-            for side, foot in zip(Side, estimator.anchors, strict=True):
-                estimator.anchor(Footstep(side, Pose2D(foot.x + self._shift[0], foot.y + self._shift[1], foot.yaw)))
-            self._shift = (0.0, 0.0)
+            self._move_feet_along()
         estimator.shift = self._shift if isinstance(self._gait, Walking) else (0.0, 0.0)
         estimator.pivots = self._ground.pivots
+
+    def _move_feet_along(self) -> None:
+        """Take the feet to stand where slips have carried them with the body."""
+        for side, foot in zip(Side, self._estimator.anchors, strict=True):
+            moved = Pose2D(foot.x + self._shift[0], foot.y + self._shift[1], foot.yaw)
+            self._estimator.anchor(Footstep(side, moved))
+        self._shift = (0.0, 0.0)
 
     def _start(self, estimate: Estimate) -> None:
         """Begin to stand where the robot is."""
@@ -301,6 +306,7 @@ class Motion:
                 self._fall("fell while it was limp on request")
             elif self._may_stand(estimate) and wanted is not WalkMode.LIMP:
                 self._steps_before += self._steps_of_gait
+                self._move_feet_along()
                 self._estimator.restart()
                 self._mode, self._reason, self._gait, self._started = MotionMode.STAND, "", None, False
             return
@@ -329,7 +335,9 @@ class Motion:
             away = not is_at(wish, middle(self._feet(), p.stance_width), p.goal_tolerance, p.goal_tolerance_yaw)
         else:
             away = wish is not None
-        return away or (p.gait == "dcm" and must_step(p, self._feet(), estimate.dcm))
+        # One that has just been put down bounces; what it does in the air is no reason.
+        stands = sum(estimate.loads) > 2.0 * p.contact_force
+        return away or (stands and p.gait == "dcm" and must_step(p, self._feet(), estimate.dcm))
 
     def _wish(self) -> Wish:
         """Return what the present command asks of the walk."""
