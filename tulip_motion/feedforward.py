@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -26,18 +27,42 @@ def distance_share(com: Array, left: Array, right: Array) -> float:
     return to_left / (to_left + to_right)
 
 
+class Dynamics(NamedTuple):
+    """What a motion takes.
+
+    Attributes:
+        torques: (12,) of the joints, if the base were held [N m].
+        wrench: (6,) what would hold the base, which in truth the ground supplies through the feet: force [N] and moment
+            about odom's origin [N m], odom axes.
+    """
+
+    torques: Array
+    wrench: Array
+
+
+def inverse_dynamics(kinematics: InverseKinematics, velocity: Array, acceleration: Array) -> Dynamics:
+    """Return what a motion takes of joints and ground.
+
+    Args:
+        kinematics: The posture q_d, as `update_jacobian` saw it.
+        velocity: (18,) its velocity.
+        acceleration: (18,) its acceleration; zero leaves gravity and Coriolis terms.
+    """
+    generalized = pin.rnea(kinematics.model, kinematics.data, kinematics.configuration, velocity, acceleration)
+    return Dynamics(generalized[6:], kinematics.twist_to_base.T.dot(generalized[:6]))
+
+
 def feedforward(
     kinematics: InverseKinematics,
-    velocity: Array,
-    acceleration: Array,
+    dynamics: Dynamics,
     right_share: float,
     aims: tuple[Array, Array] | None = None,
 ) -> Array:
     """Return the (12,) joint torques tau_ff = alpha tau_R + (1 - alpha) tau_L [N m], eqs. (14)-(15).
 
-    tau_s is the inverse dynamics of the robot rooted in foot s. The free-flyer model gives both at once: its inverse
-    dynamics leaves a base wrench that in truth the ground supplies through foot s, so what that wrench does to the
-    joints of leg s is taken off. Written about odom's origin, it is the same wrench whichever foot it acts on.
+    tau_s is the inverse dynamics of the robot rooted in foot s. The free-flyer model gives both at once: what its
+    base wrench does to the joints of leg s is taken off. Written about odom's origin, it is the same wrench whichever
+    foot it acts on.
 
     As printed, each foot gets its share of the wrench as it is: right on one foot, but on both the moments about the
     two soles, large and opposed, tilt the feet. With `aims`, each foot takes its share of the wrench as it acts about
@@ -46,14 +71,11 @@ def feedforward(
 
     Args:
         kinematics: The posture q_d, as `update_jacobian` saw it.
-        velocity: (18,) its velocity.
-        acceleration: (18,) its acceleration; zero leaves gravity and Coriolis terms.
+        dynamics: Of its motion.
         right_share: alpha, 1 with all weight on the right foot.
         aims: (3,) aim point of the ZMP on the left and right foot, odom axes [m]; None for eq. (15) as printed.
     """
-    generalized = pin.rnea(kinematics.model, kinematics.data, kinematics.configuration, velocity, acceleration)
-    torques: Array = generalized[6:]
-    wrench = kinematics.twist_to_base.T.dot(generalized[:6])  # force, moment about odom's origin
+    torques, wrench = dynamics
     shares = (1.0 - right_share, right_share)
     for side in (0, 1):
         if shares[side] > 0.0:

@@ -75,6 +75,14 @@ class Reference:
     com: ComMotion | None = None
     torso_yaw_acceleration: float = 0.0
 
+    @property
+    def other_standing(self) -> Footstep | None:
+        """The other foot as it stands, or None while it swings."""
+        if self.support is not Support.DOUBLE:
+            return None
+        x, y, _ = self.other.position.tolist()
+        return Footstep(self.stance.side.other, Pose2D(x, y, self.other.yaw))
+
 
 def support_on(side: Side) -> Support:
     """Return single support on a foot."""

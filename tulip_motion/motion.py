@@ -406,16 +406,12 @@ class Motion:
             self._shift = self._estimator.shift = (0.0, 0.0)
 
     def _stabilize(self, estimate: Estimate, reference: Reference) -> Balance:
-        """Return the ZMP that brings the measured DCM back to the planned one, within the soles that stand."""
+        """Return the CMP that brings the measured DCM back to the planned one, within what the body can do."""
         # In open loop nothing is corrected: the plan's own DCM leaves the plan's ZMP.
         dcm = estimate.dcm if reference.com is None else reference.dcm
-        other = None
-        if reference.support is Support.DOUBLE:
-            foot = reference.other
-            other = Footstep(
-                reference.stance.side.other, Pose2D(float(foot.position[0]), float(foot.position[1]), foot.yaw)
-            )
-        return stabilize(self._parameters, reference.zmp, reference.dcm, dcm, reference.stance, other)
+        return stabilize(
+            self._parameters, reference.zmp, reference.dcm, dcm, reference.stance, reference.other_standing
+        )
 
     def _send(self, order: Order) -> JointCommand:
         """Number an order of the joints, and stamp it with the time of the sensors that it answers."""

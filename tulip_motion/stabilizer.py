@@ -1,4 +1,4 @@
-"""Balance: the ZMP that brings the DCM back to its reference, kept inside the feet."""
+"""Balance: the ZMP that brings the DCM back to its reference, inside the feet, and the CMP, a little beyond them."""
 
 from __future__ import annotations
 
@@ -13,15 +13,18 @@ from tulip_motion.parameters import MotionParameters
 
 @dataclass(frozen=True)
 class Balance:
-    """The commanded ZMP.
+    """The commanded ZMP and CMP.
 
     Attributes:
-        zmp: (x, y) in odom [m].
+        zmp: (x, y) in odom [m], inside the soles.
+        cmp: Centroidal moment pivot, (x, y) in odom [m]: the CoM is pushed away from it. Where it lies beyond the
+            soles, the hip strategy turns the torso.
         right_share: Share of the weight on the right foot, 0 to 1: the ZMP projected onto the line
             between the feet, which eq. (15) uses as alpha.
     """
 
     zmp: tuple[float, float]
+    cmp: tuple[float, float]
     right_share: float
 
 
@@ -33,7 +36,7 @@ def stabilize(
     stance: Footstep,
     other: Footstep | None,
 ) -> Balance:
-    """Return zmp = ref + (1 + k) (dcm - dcm_ref), moved to the nearest point inside the support.
+    """Return zmp = ref + (1 + k) (dcm - dcm_ref), moved to the nearest point in reach of the ankles, and of the hips.
 
     Args:
         parameters: Of motion control.
@@ -46,12 +49,17 @@ def stabilize(
     p = parameters
     gain = 1.0 + p.dcm_gain
     wanted = (zmp[0] + gain * (dcm[0] - dcm_planned[0]), zmp[1] + gain * (dcm[1] - dcm_planned[1]))
-    point, share = nearest_in_support(p, wanted, stance, other)
-    return Balance(point, share if stance.side is Side.LEFT else 1.0 - share)
+    zmp, share = nearest_in_support(p, wanted, stance, other)
+    cmp, _ = nearest_in_support(p, wanted, stance, other, p.cmp_beyond_sole)
+    return Balance(zmp, cmp, share if stance.side is Side.LEFT else 1.0 - share)
 
 
 def nearest_in_support(
-    parameters: MotionParameters, point: tuple[float, float], stance: Footstep, other: Footstep | None
+    parameters: MotionParameters,
+    point: tuple[float, float],
+    stance: Footstep,
+    other: Footstep | None,
+    beyond: float = 0.0,
 ) -> tuple[tuple[float, float], float]:
     """Return the point moved into the support, and the other foot's share of the weight with the ZMP there.
 
@@ -60,6 +68,7 @@ def nearest_in_support(
         point: In odom [m].
         stance: The foot that stands.
         other: The other foot if it stands as well, else None.
+        beyond: Way beyond the limits of the ZMP that still counts as inside [m].
     """
     p = parameters
     aim = sole_point(stance, p.zmp_forward, p.zmp_inward)
@@ -73,6 +82,7 @@ def nearest_in_support(
     # Both soles are the same rectangle, so their hull is that rectangle moved along the line between them.
     c, s = math.cos(stance.pose.yaw), math.sin(stance.pose.yaw)
     dx, dy = point[0] - aim[0], point[1] - aim[1]
-    forward = min(max(c * dx + s * dy, -p.zmp_limit_heel), p.zmp_limit_toe)
-    left = min(max(c * dy - s * dx, -p.zmp_limit_side), p.zmp_limit_side)
+    forward = min(max(c * dx + s * dy, -p.zmp_limit_heel - beyond), p.zmp_limit_toe + beyond)
+    side = p.zmp_limit_side + beyond
+    left = min(max(c * dy - s * dx, -side), side)
     return (aim[0] + c * forward - s * left, aim[1] + s * forward + c * left), share

@@ -10,11 +10,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from tulip_description.planar import Pose2D
 from tulip_description.robot import Robot
-from tulip_motion.feedforward import distance_share, feedforward
+from tulip_motion.feedforward import distance_share, feedforward, inverse_dynamics
 from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import Reference, sole_point
+from tulip_motion.hip_strategy import turn_for_balance
 from tulip_motion.interface import Side
 from tulip_motion.inverse_kinematics import InverseKinematics, TaskTarget, orientation_error, rotation_z
 from tulip_motion.joint_control import JointGains, feedback
@@ -155,20 +155,23 @@ class Tracking:
         climb = min(max(p.com_height - self._height, -HEIGHT_RATE * dt), HEIGHT_RATE * dt)
         self._height += climb
         rate = climb / dt
+        upright = rotation_z(reference.torso_yaw)
         if reference.com is None:
+            # CoM and torso are led by what is measured, through their accelerations. Joints that held the torso upright
+            # as well would hold it against the hip strategy, and against the ground when a sole tilts.
             com, velocity = estimate.com, estimate.com_velocity
+            torso, torso_rate = estimate.base_rotation, estimate.angular_velocity
             self._standing_on = None
         else:
             com, velocity = reference.com.position, reference.com.velocity
+            torso, torso_rate = upright, np.array((0.0, 0.0, reference.torso_yaw_rate))
             self._stand_on(reference.stance)
         com_target = np.array((com[0], com[1], self._height))
         com_rate = np.array((velocity[0], velocity[1], rate))
-        torso = rotation_z(reference.torso_yaw)
-        torso_rate = np.array((0.0, 0.0, reference.torso_yaw_rate))
         kinematics.update_jacobian(reference.stance.side)
         kinematics.solve_velocity(TaskTarget(com_target, com_rate, torso, torso_rate, reference.other))
 
-        acceleration = self._task_acceleration(estimate, reference, balance, torso, rate)
+        acceleration = self._task_acceleration(estimate, reference, balance, upright, rate)
         self.com_acceleration = acceleration[:3].copy()
         self.torques[1] = self._feedforward(acceleration, estimate, reference, balance)
         kinematics.integrate(dt, reference.stance.pose)
@@ -212,8 +215,8 @@ class Tracking:
         x, y, z = estimate.com.tolist()
         return np.array(
             (
-                self._omega**2 * (x - balance.zmp[0]),
-                self._omega**2 * (y - balance.zmp[1]),
+                self._omega**2 * (x - balance.cmp[0]),
+                self._omega**2 * (y - balance.cmp[1]),
                 p.height_stiffness * (self._height - z)
                 - p.height_damping * (float(estimate.com_velocity[2]) - height_rate),
                 *self._torso_acceleration(estimate, torso, reference),
@@ -237,9 +240,16 @@ class Tracking:
             return np.zeros(12)
         sharing = self._sharing(estimate, reference, balance)
         if kind == "gravity":
-            return feedforward(kinematics, np.zeros(18), np.zeros(18), *sharing)
-        generalized = kinematics.solve_acceleration(acceleration)
-        return feedforward(kinematics, kinematics.velocity, generalized, *sharing)
+            return feedforward(kinematics, inverse_dynamics(kinematics, np.zeros(18), np.zeros(18)), *sharing)
+        dynamics = inverse_dynamics(kinematics, kinematics.velocity, kinematics.solve_acceleration(acceleration))
+        if reference.com is None:
+            stance, other = reference.stance, reference.other_standing
+            about_x, about_y = turn_for_balance(self._parameters, dynamics.wrench, stance, other)
+            if about_x or about_y:
+                acceleration[3:5] += about_x, about_y
+                generalized = kinematics.solve_acceleration(acceleration)
+                dynamics = inverse_dynamics(kinematics, kinematics.velocity, generalized)
+        return feedforward(kinematics, dynamics, *sharing)
 
     def _sharing(
         self, estimate: Estimate, reference: Reference, balance: Balance
@@ -251,11 +261,8 @@ class Tracking:
             return distance_share(com, *self._kinematics.sole_positions), None
         if balance.right_share in (0.0, 1.0):
             return balance.right_share, None  # one foot takes all of it, wherever it does
-        foot = reference.other
-        other = Footstep(
-            reference.stance.side.other, Pose2D(float(foot.position[0]), float(foot.position[1]), foot.yaw)
-        )
-        points = [np.array((*sole_point(step, p.zmp_forward, p.zmp_inward), 0.0)) for step in (reference.stance, other)]
+        steps = (reference.stance, reference.other_standing)
+        points = [np.array((*sole_point(step, p.zmp_forward, p.zmp_inward), 0.0)) for step in steps if step is not None]
         left, right = points if reference.stance.side is Side.LEFT else points[::-1]
         return balance.right_share, (left, right)
 
