@@ -9,6 +9,7 @@ upright attitude as brings the ZMP back into them.
 
 from __future__ import annotations
 
+import numpy as np
 from numpy.typing import NDArray
 
 from tulip_motion.footsteps import Footstep
@@ -17,7 +18,7 @@ from tulip_motion.stabilizer import nearest_in_support
 
 
 def turn_for_balance(
-    parameters: MotionParameters, wrench: NDArray, stance: Footstep, other: Footstep | None
+    parameters: MotionParameters, wrench: NDArray[np.float64], stance: Footstep, other: Footstep | None
 ) -> tuple[float, float]:
     """Return what to add to the torso's angular acceleration about odom's x and y [rad/s^2]; (0, 0) if nothing.
 

@@ -134,11 +134,9 @@ class MotionParameters:
     zmp_limit_heel: float = 0.08  # [m] behind the aim point
     zmp_limit_toe: float = 0.09  # [m] ahead of the aim point
     zmp_limit_side: float = _tuned("zmp_limit_side")  # [m] either side of the aim point
-    cmp_beyond_sole: float = (
-        0.04  # [m] of the CMP beyond the ZMP's limits, by the torso's turning
-    )
+    cmp_beyond_sole: float = _tuned("cmp_beyond_sole")  # [m] of the CMP beyond these limits, by a torso that turns
     torso_inertia: float = 0.85  # [kg m^2] moment about the CoM by the torso's angular acceleration, feet at rest
-    max_lean: float = 0.4  # [rad] of the torso, for balance
+    max_lean: float = _tuned("max_lean")  # [rad] of the torso, for balance
     observer_position_gain: float = _tuned("observer_position_gain")  # [1/s]
     observer_twist_share: float = 0.5  # of a sole's twist, in the body's velocity; all of it keeps feet twisting
     imu_bias_time: float = 2.0  # [s] of single support, after which 63 % of the IMU's tilt error is known

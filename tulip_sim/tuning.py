@@ -60,26 +60,25 @@ SPACE: dict[str, tuple[float, float]] = {
     "observer_velocity_gain": (20.0, 160.0),  # [1/s]
     "height_stiffness": (40.0, 250.0),  # [1/s^2]
     "height_damping": (8.0, 40.0),  # [1/s]
-    "torso_stiffness": (20.0, 150.0),  # [1/s^2]
+    "torso_stiffness": (20.0, 200.0),  # [1/s^2]
     "torso_damping": (5.0, 30.0),  # [1/s]
+    "cmp_beyond_sole": (0.0, 0.1),  # [m]
+    "max_lean": (0.0, 0.5),  # [rad]
 }
 """Bounds of every parameter in gait.yaml."""
 
 WALKS = ("forward", "sideways", "backward", "turn", "start_stop")
 SLIPPERY = WorldParameters(friction=(WorldParameters.friction[0],) * 2)
-PUSH = (11.0, 12.0)  # [N s] range
-WEAK_PUSHES = (
-    *((45, 0.8), (135, 0.4), (135, 0.6), (270, 0.8), (315, 0.05), (315, 0.2)),
-    *((225, 0.6), (90, 0.4), (45, 0.05), (90, 0.05), (90, 0.2), (0, 0.8)),
+PUSH = (11.5, 13.0)  # [N s] range
+WEAK_PUSHES: tuple[tuple[int, float | None], ...] = (
+    *((45, 0.05), (90, 0.05), (90, 0.2), (180, None), (270, 0.8), (0, 0.8)),
+    *((45, 0.2), (135, 0.05), (225, 0.8), (135, None), (315, 0.8), (180, 0.4)),
 )
-"""Direction [deg] and phase of pushes that gaits survived least."""
-_PHASES = tuple(phase for phase in PHASES if phase is not None)
-# Strides that share no divisor with the lengths lead to every pair once, and neighbours differ in both.
-_PUSHES = (
-    (DIRECTIONS[3 * i % len(DIRECTIONS)], _PHASES[i % len(_PHASES)]) for i in range(len(DIRECTIONS) * len(_PHASES))
-)
+"""Direction [deg] and phase, None while standing, of pushes that gaits survived least."""
+# 8 directions and 6 phases meet in pairs of like parity only; the second half of the round is moved by one.
+_PUSHES = ((DIRECTIONS[(3 * i + i // 24) % len(DIRECTIONS)], PHASES[i % len(PHASES)]) for i in range(48))
 OTHER_PUSHES = tuple(push for push in _PUSHES if push not in WEAK_PUSHES)
-"""The other pushes while walking of bench `push`."""
+"""The other pushes of bench `push`."""
 WEAK_SHARE, OTHER_SHARE = 6, 2  # pushes a seed of each kind; the next seed has the next ones
 FALL_SHARE = 0.5  # of a push survived, at most, for one that was not
 LONGEST_PULSE = 2.0  # [s] of walking, then as long of standing, in "start_stop"
@@ -157,8 +156,8 @@ def evaluate(values: Mapping[str, float], seeds: Collection[int], seconds: float
     return Figures(pushes=float(np.mean(pushes)), **means)
 
 
-def pushes_of(seed: int) -> list[tuple[int, float, float]]:
-    """Return direction [deg], phase and impulse [N s] of the pushes of a seed.
+def pushes_of(seed: int) -> list[tuple[int, float | None, float]]:
+    """Return direction [deg], phase (None: standing) and impulse [N s] of the pushes of a seed.
 
     Two seeds have all the weak pushes of the list, and each has others besides.
     """

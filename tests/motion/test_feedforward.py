@@ -9,7 +9,7 @@ import pytest
 from tulip_description.model import floating_model, joint_indices, sole_model
 from tulip_description.posture import standing_posture
 from tulip_description.robot import load_robot
-from tulip_motion.feedforward import distance_share, feedforward
+from tulip_motion.feedforward import distance_share, feedforward, inverse_dynamics
 from tulip_motion.interface import Side
 from tulip_motion.inverse_kinematics import InverseKinematics
 from tulip_motion.motion import with_fixed_head
@@ -41,13 +41,8 @@ def test_feedforward_on_one_foot_is_the_inverse_dynamics_of_the_model_rooted_the
     ).vector
     base = np.linalg.solve(fixed[:, :6], -drift - fixed[:, 6:] @ accelerations)
     aims = (np.array([0.04, 0.12, 0.0]), np.array([0.04, -0.12, 0.0]))
-    torques = feedforward(
-        kinematics,
-        kinematics.velocity,
-        np.concatenate([base, accelerations]),
-        float(stance),
-        aims,
-    )
+    dynamics = inverse_dynamics(kinematics, kinematics.velocity, np.concatenate([base, accelerations]))
+    torques = feedforward(kinematics, dynamics, float(stance), aims)
     rooted = sole_model(ROBOT, stance.name.lower())
     order = joint_indices(rooted, ROBOT)
     q, v, a = np.empty(12), np.empty(12), np.empty(12)
@@ -59,15 +54,8 @@ def test_feedforward_on_one_foot_is_the_inverse_dynamics_of_the_model_rooted_the
 def test_feedforward_on_both_feet_needs_no_tilting_moment_at_the_ankles() -> None:
     kinematics = solver()
     kinematics.update_jacobian(Side.LEFT)
-    zero = np.zeros(18)
     aims = (np.array([0.04, 0.12, 0.0]), np.array([0.04, -0.12, 0.0]))
-    torques = feedforward(
-        kinematics,
-        zero,
-        zero,
-        0.5,
-        aims,
-    )
+    torques = feedforward(kinematics, inverse_dynamics(kinematics, np.zeros(18), np.zeros(18)), 0.5, aims)
     # The feet weigh little and stand under their ankles: only their own CoM offset loads the roll axes.
     assert np.abs(torques[[5, 11]]).max() < 0.1
 
@@ -75,14 +63,8 @@ def test_feedforward_on_both_feet_needs_no_tilting_moment_at_the_ankles() -> Non
 def test_eq_15_as_printed_blends_the_torques_of_the_models_rooted_in_either_foot() -> None:
     kinematics = solver()
     kinematics.update_jacobian(Side.LEFT)
-    zero = np.zeros(18)
     alpha = 0.3
-    torques = feedforward(
-        kinematics,
-        zero,
-        zero,
-        alpha,
-    )
+    torques = feedforward(kinematics, inverse_dynamics(kinematics, np.zeros(18), np.zeros(18)), alpha)
     expected = np.zeros(12)
     for side, share in ((Side.LEFT, 1.0 - alpha), (Side.RIGHT, alpha)):
         rooted = sole_model(ROBOT, side.name.lower())

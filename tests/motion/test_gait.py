@@ -95,6 +95,13 @@ def test_commanded_zmp_stays_inside_the_support(x: float, y: float, both: bool) 
     assert -P.zmp_limit_heel - 1e-12 <= offset[0] <= P.zmp_limit_toe + 1e-12
     assert abs(offset[1]) <= P.zmp_limit_side + 1e-12
     assert both or share == 0.0
+    beyond = np.abs(np.subtract(balance.cmp, balance.zmp))
+    assert beyond.max() <= P.cmp_beyond_sole + 1e-12
+    if beyond.any():  # the ankles come first
+        clipped = np.isclose(offset, (P.zmp_limit_toe, P.zmp_limit_side)) | np.isclose(
+            offset, (-P.zmp_limit_heel, -P.zmp_limit_side)
+        )
+        assert np.all(clipped | (beyond < 1e-12))
 
 
 def test_zmp_feedback_is_exact_where_it_is_not_clipped() -> None:
@@ -102,6 +109,7 @@ def test_zmp_feedback_is_exact_where_it_is_not_clipped() -> None:
     balance = stabilize(P, aim, aim, (aim[0] + 0.01, aim[1] - 0.01), LEFT, None)
     gain = 1.0 + P.dcm_gain
     assert balance.zmp == pytest.approx((aim[0] + gain * 0.01, aim[1] - gain * 0.01))
+    assert balance.cmp == balance.zmp
 
 
 def test_parameters_refuse_a_double_support_longer_than_the_step() -> None:
