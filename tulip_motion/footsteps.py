@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from tulip_description.planar import Pose2D
 from tulip_motion.interface import Side
 
 
-@dataclass(frozen=True)
-class Footstep:
+class Footstep(NamedTuple):
     """A foot on the ground: which one, and the pose of its sole in odom."""
 
     side: Side

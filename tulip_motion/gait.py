@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,7 @@ from tulip_motion.interface import Side, Support
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class FootMotion:
+class FootMotion(NamedTuple):
     """Pose of a sole in odom with its derivatives; the sole stays level.
 
     Attributes:
@@ -36,8 +35,7 @@ class FootMotion:
         return FootMotion(np.array([pose.x, pose.y, 0.0]), np.zeros(3), np.zeros(3), pose.yaw)
 
 
-@dataclass(frozen=True)
-class ComMotion:
+class ComMotion(NamedTuple):
     """Planned horizontal motion of the CoM in odom.
 
     Attributes:
@@ -49,8 +47,7 @@ class ComMotion:
     acceleration: Array
 
 
-@dataclass(frozen=True)
-class Reference:
+class Reference(NamedTuple):
     """What the gait wants now, in odom.
 
     Attributes:
@@ -62,6 +59,7 @@ class Reference:
         phase: Progress of the step or kick, 0 to 1.
         com: What the CoM follows in open loop; without it, it is led by the feedback of the ZMP.
         torso_yaw_acceleration: [rad/s^2].
+        torso_held: The joints hold the torso upright, against a leg that kicks; else it may lean for balance.
     """
 
     support: Support
@@ -74,6 +72,7 @@ class Reference:
     phase: float
     com: ComMotion | None = None
     torso_yaw_acceleration: float = 0.0
+    torso_held: bool = False
 
     @property
     def other_standing(self) -> Footstep | None:

@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -41,8 +40,7 @@ LEG_COLUMNS = (slice(0, 6), slice(6, 12))
 """Where the left and the right leg's joints stand among the twelve."""
 
 
-@dataclass(frozen=True)
-class TaskTarget:
+class TaskTarget(NamedTuple):
     """Desired task-space state in odom, x_d of the paper.
 
     Attributes:

@@ -28,17 +28,14 @@ class JointGains:
 
     def of(self, support: Support, open_loop: bool = False) -> tuple[Array, Array]:
         """Return (12,) stiffness [N m/rad] and (12,) damping [N m s/rad] for a support."""
-        gains = (self._open_loop if open_loop else self._closed_loop)[support]
-        return gains[0], gains[1]
+        return (self._open_loop if open_loop else self._closed_loop)[int(support)]
 
 
-def _by_support(stance: Array, swing: Array) -> dict[Support, Array]:
-    """Return (2, 12) gains of both legs from the (2, 6) gains of one."""
-    return {
-        Support.DOUBLE: np.hstack([stance, stance]),
-        Support.LEFT: np.hstack([stance, swing]),
-        Support.RIGHT: np.hstack([swing, stance]),
-    }
+def _by_support(stance: Array, swing: Array) -> dict[int, tuple[Array, Array]]:
+    """Return (12,) stiffness and (12,) damping of both legs from the (2, 6) gains of one."""
+    legs = {Support.DOUBLE: (stance, stance), Support.LEFT: (stance, swing), Support.RIGHT: (swing, stance)}
+    gains = {int(support): np.hstack(pair) for support, pair in legs.items()}
+    return {support: (stiffness, damping) for support, (stiffness, damping) in gains.items()}
 
 
 def feedback(stiffness: Array, damping: Array, error: Array, error_rate: Array) -> Array:

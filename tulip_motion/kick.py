@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import FootMotion, Reference, between_soles, sole_point, support_on
-from tulip_motion.interface import Support
+from tulip_motion.interface import Side, Support
 from tulip_motion.kick_path import FootPath, Move, brake
 from tulip_motion.lipm import DcmPlan, time_constant
 from tulip_motion.parameters import MotionParameters
@@ -109,12 +109,12 @@ class Kick:
         """Progress, 0 to 1."""
         return 1.0 if self.finished else min(self._time / self._total, 1.0)
 
-    def tick(self, dt: float, landed: Sequence[Pose2D], loads: tuple[float, float]) -> Reference:
+    def tick(self, dt: float, sole: Callable[[Side], Pose2D], loads: tuple[float, float]) -> Reference:
         """Advance by one tick.
 
         Args:
             dt: [s].
-            landed: Where the left and right sole are now, as measured, in odom.
+            sole: Says where a sole is now, as measured, in odom.
             loads: Vertical force on the left and right sole [N].
         """
         p = self._parameters
@@ -125,7 +125,7 @@ class Kick:
             lowering = left < p.kick_lower_time * (1.0 - p.contact_phase)
             late = left < -2.0 * p.late_contact_time
             if lowering and (loads[self.side] > p.contact_force or late):
-                self._feet = [Footstep(foot.side, landed[foot.side]) for foot in self._feet]
+                self._feet = [Footstep(foot.side, sole(foot.side)) for foot in self._feet]
                 self._stance = self._feet[self.side.other]
                 self._begin_to_stand()
         elapsed = self._time - (self._down_at or 0.0)
@@ -135,9 +135,9 @@ class Kick:
         if not self._in_air:
             foot = FootMotion.resting(self._feet[self.side].pose)
             yaw = self._stance.pose.yaw + 0.5 * wrap_angle(foot.yaw - self._stance.pose.yaw)
-            return Reference(Support.DOUBLE, self._stance, foot, zmp, dcm, yaw, 0.0, self.phase)
+            return Reference(Support.DOUBLE, self._stance, foot, zmp, dcm, yaw, 0.0, self.phase, torso_held=True)
         foot = self._path.evaluate(self._air_time)
-        stance = self._turned_stance(landed[self._stance.side].yaw, dt)
+        stance = self._turned_stance(sole(self._stance.side).yaw, dt)
         rate, acceleration = self._turn_torso(foot, dt)
         return Reference(
             support_on(stance.side),
@@ -149,6 +149,7 @@ class Kick:
             rate,
             self.phase,
             torso_yaw_acceleration=acceleration,
+            torso_held=True,
         )
 
     def _turned_stance(self, measured_yaw: float, dt: float) -> Footstep:

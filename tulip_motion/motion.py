@@ -38,7 +38,7 @@ from tulip_motion.paper_gait import PaperGait
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import reach
 from tulip_motion.stabilizer import Balance, stabilize
-from tulip_motion.state_estimator import Estimate, StateEstimator, planar_pose
+from tulip_motion.state_estimator import Estimate, StateEstimator
 from tulip_motion.tracking import Order, StepInProgress, Tracking
 from tulip_motion.walking import Walking, must_step
 from tulip_motion.walking_kick import WalkingKick
@@ -363,23 +363,16 @@ class Motion:
 
     def _advance_gait(self, estimate: Estimate) -> Reference:
         """Return what walk or kick want now, or standing where the feet are, and keep the feet that they put down."""
-        dt = self._parameters.control_period
-        if isinstance(self._gait, Walking):
-            landed = [planar_pose(sole) for sole in estimate.soles]
-            before = self._gait.feet
-            reference = self._gait.tick(dt, self._wish(), estimate.dcm, landed, estimate.loads)
-            self._gait.feet = carried(before, self._gait.feet, self._shift, estimate)
-            self._anchor(self._gait.feet)
-            return reference
-        if isinstance(self._gait, PaperGait):
-            landed = [planar_pose(sole) for sole in estimate.soles]
-            reference = self._gait.tick(dt, self._wish(), estimate.dcm, landed, estimate.loads)
-            self._anchor(self._gait.feet)
-            return reference
-        if isinstance(self._gait, Kick):
-            landed = [planar_pose(sole) for sole in estimate.soles]
-            reference = self._gait.tick(dt, landed, estimate.loads)
-            self._anchor(self._gait.feet)
+        dt, gait = self._parameters.control_period, self._gait
+        if gait is not None:
+            before = gait.feet
+            if isinstance(gait, Kick):
+                reference = gait.tick(dt, estimate.sole_pose, estimate.loads)
+            else:
+                reference = gait.tick(dt, self._wish(), estimate.dcm, estimate.sole_pose, estimate.loads)
+            if isinstance(gait, Walking):
+                gait.feet = carried(before, gait.feet, self._shift, estimate)
+            self._anchor(gait.feet)
             return reference
         left, right = self._feet()
         middle = self._middle()

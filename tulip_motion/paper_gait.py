@@ -8,6 +8,7 @@ stands again, the same happens in reverse.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -104,7 +105,7 @@ class PaperGait:
         dt: float,
         wish: Wish,
         dcm: tuple[float, float],
-        landed: list[Pose2D],
+        sole: Callable[[Side], Pose2D],
         loads: tuple[float, float],
     ) -> Reference:
         """Advance by one tick.
@@ -113,7 +114,7 @@ class PaperGait:
             dt: [s].
             wish: Velocity to walk with, or None to stop; this gait does not go to goals.
             dcm: Not used: the gait is open loop.
-            landed: Where the left and right sole are now, as measured, in odom. A stance foot is where it landed;
+            sole: Says where a sole is now, as measured, in odom. A stance foot is where it landed;
                 CoM and swing foot are planned relative to it, so the joint angles do not depend on that.
             loads: Not used: the support changes at fixed times.
         """
@@ -126,7 +127,7 @@ class PaperGait:
         if isinstance(part, Rocking) and self.step_count == 0 and self._time >= part.duration:
             self._begin_step(part.end, part.other, wanted, part.duration)
         elif isinstance(part, MirroredStep) and self._time >= part.shape.duration:
-            self._land(part, wanted, landed)
+            self._land(part, wanted, sole)
         return self._reference()
 
     def _begin_start(self, wanted: Velocity) -> None:
@@ -164,10 +165,10 @@ class PaperGait:
         limits = (p.zmp_limit_heel, p.zmp_limit_toe, p.zmp_limit_side - abs(p.paper_zmp_inward))
         self._part = step_between(self._shape, side, start, other, turn, target, limits)
 
-    def _land(self, step: MirroredStep, wanted: Velocity | None, landed: list[Pose2D]) -> None:
+    def _land(self, step: MirroredStep, wanted: Velocity | None, sole: Callable[[Side], Pose2D]) -> None:
         """Take the swing foot as the stance foot, and begin the next step, or to stand."""
         side = step.side.other
-        stance = self._stance = Footstep(side, landed[side])
+        stance = self._stance = Footstep(side, sole(side))
         self.feet = (stance, self.feet[1]) if side is Side.LEFT else (self.feet[0], stance)
         start, other = step.next_start(), step.after.inverse()
         if wanted is not None or self.velocity != (0.0, 0.0, 0.0):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import sole_point
@@ -11,8 +11,7 @@ from tulip_motion.interface import Side
 from tulip_motion.parameters import MotionParameters
 
 
-@dataclass(frozen=True)
-class Balance:
+class Balance(NamedTuple):
     """The commanded ZMP and CMP.
 
     Attributes:
@@ -50,7 +49,7 @@ def stabilize(
     gain = 1.0 + p.dcm_gain
     wanted = (zmp[0] + gain * (dcm[0] - dcm_planned[0]), zmp[1] + gain * (dcm[1] - dcm_planned[1]))
     zmp, share = nearest_in_support(p, wanted, stance, other)
-    cmp, _ = nearest_in_support(p, wanted, stance, other, p.cmp_beyond_sole)
+    cmp = zmp if zmp == wanted else nearest_in_support(p, wanted, stance, other, p.cmp_beyond_sole)[0]
     return Balance(zmp, cmp, share if stance.side is Side.LEFT else 1.0 - share)
 
 

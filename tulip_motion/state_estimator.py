@@ -9,8 +9,7 @@ pose's error add up in the position.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -29,8 +28,7 @@ Array = NDArray[np.float64]
 Point = tuple[float, float, float]
 
 
-@dataclass(frozen=True)
-class Estimate:
+class Estimate(NamedTuple):
     """The body at one instant, in odom.
 
     Attributes:
@@ -63,6 +61,10 @@ class Estimate:
     loads: tuple[float, float]
     tilt: float
 
+    def sole_pose(self, side: Side) -> Pose2D:
+        """Return where a sole is, seen from above."""
+        return planar_pose(self.soles[side])
+
 
 class StateEstimator:
     """Says where the body is, from where the soles stand and what IMU and joints say."""
@@ -89,11 +91,10 @@ class StateEstimator:
         # Views into Pinocchio's data, made once: making one takes as long as what is done with it.
         self._model_com, self._model_com_velocity = data.com[0], data.vcom[0]
         self._base_rotation = data.oMi[1].rotation
-        self._sole_positions = tuple(data.oMf[i].translation for i in self._soles)
         self._heading_offset: float | None = None
         self._tilt_bias = (0.0, 0.0)  # [rad] of the IMU about the x and y axis of base_link
-        self._com: list[float] | None = None
-        self._com_velocity = [0.0, 0.0, 0.0]
+        self._begins = True
+        self._com, self._com_velocity = np.zeros(3), np.zeros(3)
         self.anchors: list[Pose2D] = [Pose2D(), Pose2D()]
         """Where the left and the right sole stand, or were put down last, in odom."""
         self.shift = (0.0, 0.0)
@@ -107,7 +108,7 @@ class StateEstimator:
 
     def restart(self) -> None:
         """Forget the CoM's motion; the next update begins with the feet where they are measured."""
-        self._com = None
+        self._begins = True
         self.shift = (0.0, 0.0)
 
     def update(self, sensors: Sensors, left_weight: float, acceleration: Array) -> Estimate:
@@ -129,32 +130,31 @@ class StateEstimator:
         soles = np.empty((2, 4, 4))
         for side, frame in enumerate(self._soles):
             soles[side] = pin.updateFramePlacement(model, data, frame).homogeneous
-        if self._com is None:
+        if self._begins:
             self._begin(soles)
         cells = sensors.foot_cells
         loads = (sum(cells[0].tolist()), sum(cells[1].tolist()))
-        position, velocity, yaw_rates = self._from_feet(left_weight, cells, loads)
-        x, y, z = position
-        for sole, place in zip(soles, self._sole_positions, strict=True):
-            px, py, pz = place.tolist()
-            sole[:3, 3] = (px + x, py + y, pz + z)
+        pressures = [cells[side].dot(self._cells[side]).tolist() for side in (0, 1)]
+        position, velocity, yaw_rates = self._from_feet(left_weight, pressures, loads)
+        base_position, base_velocity = np.array(position), np.array(velocity)
+        soles[:, :3, 3] += base_position
         rotation = self._base_rotation.copy()
         if left_weight in (0.0, 1.0):
             self._learn_tilt_bias(soles[Side.LEFT if left_weight == 1.0 else Side.RIGHT], rotation)
-        com, com_velocity = self._observe(position, velocity, self._felt(acceleration, loads))
+        self._observe(base_position, base_velocity, self._felt(acceleration, loads))
         return Estimate(
-            np.array(position),
+            base_position,
             rotation,
-            np.array(velocity),
+            base_velocity,
             rotation.dot(v[3:6]),
             q[7:].copy(),
             v[6:].copy(),
-            com,
-            com_velocity,
+            self._com,
+            self._com_velocity,
             self._dcm(),
             soles,
             yaw_rates,
-            self._centre_of_pressure(cells, soles, loads),
+            self._centre_of_pressure(pressures, soles, loads),
             loads,
             math.acos(min(max(rotation[2, 2], -1.0), 1.0)),
         )
@@ -185,11 +185,16 @@ class StateEstimator:
         self._tilt_bias = (min(max(x, -most), most), min(max(y, -most), most))
 
     def _from_feet(
-        self, left_weight: float, cells: Array, loads: tuple[float, float]
+        self, left_weight: float, pressures: list[list[float]], loads: tuple[float, float]
     ) -> tuple[Point, Point, tuple[float, float]]:
         """Return position [m] and velocity [m/s] of the base for which the feet that carry stay where they stand.
 
         The third is the yaw rate of the soles [rad/s], 0 of one in the air.
+
+        Args:
+            left_weight: As of `update`.
+            pressures: Centre of pressure in the left and right sole, times its load [N m].
+            loads: Vertical force on the left and right sole [N].
         """
         x = y = z = vx = vy = vz = 0.0
         rates = [0.0, 0.0]
@@ -206,7 +211,7 @@ class StateEstimator:
             px, py, pz = place.translation.tolist()
             if carries:
                 (xx, xy, _), (yx, yy, _), (zx, zy, _) = place.rotation.tolist()
-                forward, left = (cells[side].dot(self._cells[side]) / loads[side]).tolist()
+                forward, left = pressures[side][0] / loads[side], pressures[side][1] / loads[side]
                 rx, ry, rz = xx * forward + xy * left, yx * forward + yy * left, zx * forward + zy * left
                 along, across = self.pivots[side]
                 twist = self._parameters.observer_twist_share * wz
@@ -237,48 +242,36 @@ class StateEstimator:
         in_flight = loads[0] + loads[1] < self._parameters.contact_force
         return np.array((0.0, 0.0, -GRAVITY)) if in_flight else acceleration
 
-    def _observe(self, position: Point, velocity: Point, acceleration: Array) -> tuple[Array, Array]:
-        """Predict the CoM with the commanded acceleration and pull it to the measured one; return its state.
+    def _observe(self, position: Array, velocity: Array, acceleration: Array) -> None:
+        """Predict the CoM with the commanded acceleration and pull it to the measured one.
 
         Args:
-            position: Of the base [m]; the model's CoM counts from there.
-            velocity: Of the base [m/s].
+            position: (3,) of the base [m]; the model's CoM counts from there.
+            velocity: (3,) of the base [m/s].
             acceleration: (3,) of the CoM, as commanded [m/s^2].
         """
         p, dt = self._parameters, self._parameters.control_period
-        measured = [c + base for c, base in zip(self._model_com.tolist(), position, strict=True)]
-        if self._com is None:
-            self._com, self._com_velocity = measured, [0.0, 0.0, 0.0]
-        else:
-            k_p, k_v = p.observer_position_gain, p.observer_velocity_gain
-            for i, (c, v, a, m, mv, base) in enumerate(
-                zip(
-                    self._com,
-                    self._com_velocity,
-                    acceleration.tolist(),
-                    measured,
-                    self._model_com_velocity.tolist(),
-                    velocity,
-                    strict=True,
-                )
-            ):
-                self._com[i] = c + dt * (v + k_p * (m - c))
-                self._com_velocity[i] = v + dt * (a + k_v * (mv + base - v))
-        return np.array(self._com), np.array(self._com_velocity)
+        measured = self._model_com + position
+        if self._begins:
+            self._begins = False
+            self._com, self._com_velocity = measured, np.zeros(3)
+            return
+        com, speed = self._com, self._com_velocity
+        self._com = com + dt * (speed + p.observer_position_gain * (measured - com))
+        lag = self._model_com_velocity + velocity - speed
+        self._com_velocity = speed + dt * (acceleration + p.observer_velocity_gain * lag)
 
     def _dcm(self) -> tuple[float, float]:
-        assert self._com is not None
-        (x, y, _), (vx, vy, _) = self._com, self._com_velocity
+        (x, y, _), (vx, vy, _) = self._com.tolist(), self._com_velocity.tolist()
         return x + self._time_constant * vx, y + self._time_constant * vy
 
-    def _centre_of_pressure(self, cells: Array, soles: Array, loads: tuple[float, float]) -> Array:
+    def _centre_of_pressure(self, pressures: list[list[float]], soles: Array, loads: tuple[float, float]) -> Array:
         """Return where the cells' forces act together, seen from above."""
         total = loads[0] + loads[1]
         if total < self._parameters.contact_force:
             return np.full(2, np.nan)
         x = y = 0.0
-        for force, points, sole, load in zip(cells, self._cells, soles[:, :2].tolist(), loads, strict=True):
-            forward, left = force.dot(points).tolist()  # load times the place in the sole
+        for (forward, left), sole, load in zip(pressures, soles[:, :2].tolist(), loads, strict=True):
             (xx, xy, _, px), (yx, yy, _, py) = sole
             x += load * px + xx * forward + xy * left
             y += load * py + yx * forward + yy * left

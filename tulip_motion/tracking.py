@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -16,7 +15,7 @@ from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import Reference, sole_point
 from tulip_motion.hip_strategy import turn_for_balance
 from tulip_motion.interface import Side
-from tulip_motion.inverse_kinematics import InverseKinematics, TaskTarget, orientation_error, rotation_z
+from tulip_motion.inverse_kinematics import InverseKinematics, TaskTarget, rotation_z, turn_from_yaw
 from tulip_motion.joint_control import JointGains, feedback
 from tulip_motion.learning_file import LearningFile
 from tulip_motion.lipm import time_constant
@@ -27,26 +26,25 @@ from tulip_motion.state_estimator import Estimate
 from tulip_motion.step_learning import StepLearner
 
 Array = NDArray[np.float64]
+Point = tuple[float, float]
 
 HEIGHT_RATE = 0.1  # [m/s] the CoM is brought to its walking height without a jerk
 TOUCH = 0.25  # share of the contact force at which a swing foot touches something
 
 
-@dataclass(frozen=True)
-class StepInProgress:
+class StepInProgress(NamedTuple):
     """What learning over steps has to know of a walk.
 
     Attributes:
-        count: Steps begun in this walk.
+        steps: Begun in this walk.
         velocity: Of the step [m/s], [rad/s], or None if it is none of a steady walk.
     """
 
-    count: int
+    steps: int
     velocity: Velocity | None
 
 
-@dataclass(frozen=True)
-class Order:
+class Order(NamedTuple):
     """What the legs' joints shall do until the next tick; (12,) each.
 
     Attributes:
@@ -80,9 +78,11 @@ class Tracking:
         self._gains = JointGains(p)
         self._effort_limits = robot.effort_limits[:12]
         self._omega = 1.0 / time_constant(p.com_height)
+        self._lead_share = 1.0 - math.exp(-self._omega * p.control_period)  # of the way to the DCM, in one tick
         self._height = 0.0
         self._standing_on: Footstep | None = None
-        self._planned, self._planned_velocity = np.zeros(2), np.zeros(2)
+        self._planned: Point = (0.0, 0.0)
+        self._planned_velocity: Point = (0.0, 0.0)
         self._learner: StepLearner | None = None
         if p.learning != "none":
             self._learner = StepLearner(p, self._effort_limits)
@@ -95,12 +95,12 @@ class Tracking:
     @property
     def com_planned(self) -> Array:
         """(3,) CoM that belongs to the plan, in odom [m]."""
-        return np.array([*self._planned, self._height])
+        return np.array((*self._planned, self._height))
 
     @property
     def com_velocity_planned(self) -> Array:
         """(3,) its velocity [m/s]."""
-        return np.array([*self._planned_velocity, 0.0])
+        return np.array((*self._planned_velocity, 0.0))
 
     @property
     def joint_positions(self) -> Array:
@@ -122,7 +122,7 @@ class Tracking:
         """Begin from the posture that the robot has."""
         self._kinematics.reset(estimate.base_rotation, estimate.base_position, estimate.joint_positions)
         self._height = float(estimate.com[2])
-        self._planned = estimate.com[:2].copy()
+        self._planned = (float(estimate.com[0]), float(estimate.com[1]))
         self.com_acceleration = np.zeros(3)
 
     def save_learning(self) -> None:
@@ -155,23 +155,23 @@ class Tracking:
         climb = min(max(p.com_height - self._height, -HEIGHT_RATE * dt), HEIGHT_RATE * dt)
         self._height += climb
         rate = climb / dt
-        upright = rotation_z(reference.torso_yaw)
         if reference.com is None:
-            # CoM and torso are led by what is measured, through their accelerations. Joints that held the torso upright
-            # as well would hold it against the hip strategy, and against the ground when a sole tilts.
-            com, velocity = estimate.com, estimate.com_velocity
-            torso, torso_rate = estimate.base_rotation, estimate.angular_velocity
+            (x, y, _), (vx, vy, _) = estimate.com.tolist(), estimate.com_velocity.tolist()
             self._standing_on = None
         else:
-            com, velocity = reference.com.position, reference.com.velocity
-            torso, torso_rate = upright, np.array((0.0, 0.0, reference.torso_yaw_rate))
+            (x, y), (vx, vy) = reference.com.position.tolist(), reference.com.velocity.tolist()
             self._stand_on(reference.stance)
-        com_target = np.array((com[0], com[1], self._height))
-        com_rate = np.array((velocity[0], velocity[1], rate))
+        if self._torso_leads(reference):
+            # Accelerations lead the torso. Joints that held it upright as well would hold it against the hip strategy,
+            # and against the ground when a sole tilts.
+            torso, torso_rate = estimate.base_rotation, estimate.angular_velocity
+        else:
+            torso, torso_rate = rotation_z(reference.torso_yaw), np.array((0.0, 0.0, reference.torso_yaw_rate))
+        com, com_rate = np.array((x, y, self._height)), np.array((vx, vy, rate))
         kinematics.update_jacobian(reference.stance.side)
-        kinematics.solve_velocity(TaskTarget(com_target, com_rate, torso, torso_rate, reference.other))
+        kinematics.solve_velocity(TaskTarget(com, com_rate, torso, torso_rate, reference.other))
 
-        acceleration = self._task_acceleration(estimate, reference, balance, upright, rate)
+        acceleration = self._task_acceleration(estimate, reference, balance, rate)
         self.com_acceleration = acceleration[:3].copy()
         self.torques[1] = self._feedforward(acceleration, estimate, reference, balance)
         kinematics.integrate(dt, reference.stance.pose)
@@ -185,11 +185,14 @@ class Tracking:
     def _plan_com(self, reference: Reference) -> None:
         """Keep the CoM that belongs to the plan: given, or the one that its DCM leads, c' = (xi - c) / Tc."""
         if reference.com is not None:
-            self._planned, self._planned_velocity = reference.com.position, reference.com.velocity
+            x, y = reference.com.position.tolist()
+            vx, vy = reference.com.velocity.tolist()
+            self._planned, self._planned_velocity = (x, y), (vx, vy)
             return
-        share = 1.0 - math.exp(-self._omega * self._parameters.control_period)
-        self._planned = self._planned + share * (reference.dcm - self._planned)
-        self._planned_velocity = self._omega * (reference.dcm - self._planned)
+        share = self._lead_share
+        (x, y), (dcm_x, dcm_y) = self._planned, reference.dcm
+        x, y = x + share * (dcm_x - x), y + share * (dcm_y - y)
+        self._planned, self._planned_velocity = (x, y), (self._omega * (dcm_x - x), self._omega * (dcm_y - y))
 
     def _stand_on(self, stance: Footstep) -> None:
         """Move the desired posture as a whole to a new stance foot, so that its joints take no notice of the change."""
@@ -204,8 +207,12 @@ class Tracking:
         base = anchored * sole.inverse() * data.oMi[1]
         q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
 
+    def _torso_leads(self, reference: Reference) -> bool:
+        """Return whether the torso is where accelerations lead it, upright or for balance; else the joints hold it."""
+        return reference.com is None and not reference.torso_held and self._parameters.feedforward == "full"
+
     def _task_acceleration(
-        self, estimate: Estimate, reference: Reference, balance: Balance, torso: Array, height_rate: float
+        self, estimate: Estimate, reference: Reference, balance: Balance, height_rate: float
     ) -> Array:
         """Return (12,) of the CoM, the torso and the other foot: planned, or led by what is measured."""
         p, foot, com = self._parameters, reference.other, reference.com
@@ -219,15 +226,16 @@ class Tracking:
                 self._omega**2 * (y - balance.cmp[1]),
                 p.height_stiffness * (self._height - z)
                 - p.height_damping * (float(estimate.com_velocity[2]) - height_rate),
-                *self._torso_acceleration(estimate, torso, reference),
+                *self._torso_acceleration(estimate, reference),
                 *swing,
             )
         )
 
-    def _torso_acceleration(self, estimate: Estimate, torso: Array, reference: Reference) -> tuple[float, float, float]:
-        """Return the (3,) angular acceleration [rad/s^2], odom axes, that brings the torso to its attitude."""
+    def _torso_acceleration(self, estimate: Estimate, reference: Reference) -> tuple[float, float, float]:
+        """Return the (3,) angular acceleration [rad/s^2], odom axes, that brings the torso upright and to its yaw."""
         p = self._parameters
-        ex, ey, ez = orientation_error(torso, estimate.base_rotation).tolist()
+        (_, xy, xz), (yx, _, yz), (zx, zy, _) = turn_from_yaw(reference.torso_yaw, estimate.base_rotation)
+        ex, ey, ez = 0.5 * (yz - zy), 0.5 * (zx - xz), 0.5 * (xy - yx)  # eq. (9)
         wx, wy, wz = estimate.angular_velocity.tolist()
         stiffness, damping = p.torso_stiffness, p.torso_damping
         turning = reference.torso_yaw_acceleration + damping * (reference.torso_yaw_rate - wz)
@@ -242,7 +250,7 @@ class Tracking:
         if kind == "gravity":
             return feedforward(kinematics, inverse_dynamics(kinematics, np.zeros(18), np.zeros(18)), *sharing)
         dynamics = inverse_dynamics(kinematics, kinematics.velocity, kinematics.solve_acceleration(acceleration))
-        if reference.com is None:
+        if self._torso_leads(reference):
             stance, other = reference.stance, reference.other_standing
             about_x, about_y = turn_for_balance(self._parameters, dynamics.wrench, stance, other)
             if about_x or about_y:
@@ -280,7 +288,7 @@ class Tracking:
             reference.stance.side,
             reference.support,
             reference.phase,
-            step.count,
+            step.steps,
             step.velocity,
             estimate.loads[reference.stance.side.other] > TOUCH * p.contact_force,
             error,

@@ -9,6 +9,7 @@ While the foot swings, place and time of its landing are solved together for the
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from tulip_description.planar import Pose2D
 from tulip_motion.course import Course, Wish
@@ -77,7 +78,7 @@ class Walking:
         dt: float,
         wish: Wish,
         dcm: tuple[float, float],
-        landed: list[Pose2D],
+        sole: Callable[[Side], Pose2D],
         loads: tuple[float, float],
     ) -> Reference:
         """Advance by one tick.
@@ -86,7 +87,7 @@ class Walking:
             dt: [s].
             wish: Velocity or goal to walk with or to, or None to stop.
             dcm: Measured DCM in odom [m].
-            landed: Where the left and right sole are now, as measured, in odom; used when one touches down.
+            sole: Says where a sole is now, as measured, in odom; asked for when one touches down.
             loads: Vertical force on the left and right sole [N].
         """
         if self._stance is None:
@@ -97,11 +98,8 @@ class Walking:
                 self._begin_step(self._far_foot(dcm), wish, self._parameters.double_support_time)
             if self._swing is not None and self._has_landed(loads):
                 side = self._stance.side.other
-                self.feet = (
-                    (self.feet[0], Footstep(side, landed[side]))
-                    if side is Side.RIGHT
-                    else (Footstep(side, landed[side]), self.feet[1])
-                )
+                landed = Footstep(side, sole(side))
+                self.feet = (self.feet[0], landed) if side is Side.RIGHT else (landed, self.feet[1])
                 if self.course.reached(wish, self.feet):
                     self._begin_stop(self.feet[side])
                 else:

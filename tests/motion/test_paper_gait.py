@@ -192,7 +192,7 @@ class Ideal:
                     self.poses[last.stance.side.other] = last.stance.pose @ _sole(part)
                 elif last.support is Support.DOUBLE:
                     self.poses[last.stance.side.other] = Pose2D(*foot.position[:2], foot.yaw)
-            self.references.append(self.gait.tick(DT, wanted, (0.0, 0.0), self.poses, (0.0, 0.0)))
+            self.references.append(self.gait.tick(DT, wanted, (0.0, 0.0), self.poses.__getitem__, (0.0, 0.0)))
 
 
 def _sole(step: MirroredStep) -> Pose2D:
@@ -290,7 +290,7 @@ def test_what_is_measured_does_not_change_the_plan() -> None:
     exact.go(4.0, (0.2, 0.0, 0.0))
     for _ in range(1000):
         poses = [Pose2D(0.03, 0.5, 0.2), Pose2D(-0.2, 0.1, -0.3)]  # wherever the feet are found
-        slipped.references.append(slipped.gait.tick(DT, (0.2, 0.0, 0.0), (9.0, 9.0), poses, (500.0, 500.0)))
+        slipped.references.append(slipped.gait.tick(DT, (0.2, 0.0, 0.0), (9.0, 9.0), poses.__getitem__, (500.0, 500.0)))
     for a, b in zip(exact.references, slipped.references, strict=True):
         assert a.support is b.support and a.com is not None and b.com is not None
         seen = [

@@ -80,8 +80,8 @@ def replay_own(reference: WalkReference, dead_beat: bool = False) -> Replay:
 def at_rest(instant: Instant) -> Instant:
     """Return the same places without velocities."""
     target, zero = instant.target, np.zeros(3)
-    foot = replace(target.foot, velocity=zero, yaw_rate=0.0)
-    return replace(instant, target=replace(target, com_velocity=zero, torso_angular_velocity=zero, foot=foot))
+    foot = target.foot._replace(velocity=zero, yaw_rate=0.0)
+    return replace(instant, target=target._replace(com_velocity=zero, torso_angular_velocity=zero, foot=foot))
 
 
 def replay_pink(reference: WalkReference, limited: bool, solver: str | None = None) -> Replay:
