@@ -8,8 +8,9 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
+
+from tulip_description.yaml_file import read_yaml, write_lines
 
 MOUNT_FILE = Path(__file__).with_name("camera_mount.yaml")
 LARGEST_ANGLE = math.radians(30.0)  # more is no error of mounting but another camera
@@ -74,12 +75,7 @@ def load_mount(path: Path = MOUNT_FILE) -> MountOffsets:
     Raises:
         MountFileError: if it cannot be read or holds anything else than the offsets.
     """
-    try:
-        content = yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise MountFileError(f"{path} cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise MountFileError(f"{path} is not YAML: {' '.join(str(error).split())}") from error
+    content = read_yaml(path, MountFileError)
     if not isinstance(content, dict) or not set(content) <= set(OFFSETS):
         raise MountFileError(f"{path} holds {content!r}; expected only {', '.join(OFFSETS)}, each with a number")
     try:
@@ -105,6 +101,4 @@ def write_mount(path: Path, mount: MountOffsets, provenance: Sequence[str] = ())
         *(f"# {line}".rstrip() for line in provenance),
         *(f"{name}: {float(getattr(mount, name))!r}" for name in OFFSETS),
     ]
-    temporary = path.with_name(path.name + ".new")
-    temporary.write_text("\n".join(lines) + "\n")
-    temporary.replace(path)
+    write_lines(path, lines)

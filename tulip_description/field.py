@@ -12,7 +12,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
-import yaml
+from tulip_description.yaml_file import read_yaml
 
 FIELD_FILE = Path(__file__).with_name("field.yaml")
 SURE = ("high", "medium", "low", "assumed")
@@ -318,10 +318,7 @@ def load_field(path: Path | str | None = None) -> Field:
         FieldError: if the file cannot be read, lacks an entry, has an unknown one, or does not fit together.
     """
     file = FIELD_FILE if path is None else Path(path)
-    try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise FieldError(f"{file}: cannot read the field: {error}") from error
+    content = read_yaml(file, FieldError)
     try:
         return _build(content)
     except FieldError as error:

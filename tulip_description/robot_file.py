@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
-
 from tulip_description.frames import BASE_LINK
 from tulip_description.robot import (
     JOINTS,
@@ -25,6 +23,7 @@ from tulip_description.robot import (
     Vector,
     realizable_inertia,
 )
+from tulip_description.yaml_file import read_yaml
 
 AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 T = TypeVar("T")
@@ -36,10 +35,7 @@ def read_robot(variant: str, path: Path) -> Robot:
     known: dict[str, Variant] = {name: name for name in VARIANTS}
     if variant not in known:
         raise ValueError(f"variant is {variant!r}; expected one of {', '.join(VARIANTS)}")
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
-        raise ValueError(f"{path} is not valid YAML: {error}") from error
+    data = read_yaml(path, ValueError)
     if not isinstance(data, dict):
         raise ValueError(
             f"{path} holds {type(data).__name__}; expected a mapping (see the robot.yaml of tulip_description)"

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import yaml
+from tulip_description.yaml_file import read_yaml, write_lines
 
 PATH = Path(__file__).with_name("gait.yaml")
 NODE, KEY = "motion", "ros__parameters"
@@ -69,12 +69,7 @@ def read_gait(path: Path) -> dict[str, float]:
     Raises:
         GaitFileError: if it cannot be read, or is not a parameter file of node motion with numbers only.
     """
-    try:
-        content = yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise GaitFileError(f"{path} cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise GaitFileError(f"{path} is not YAML: {error}") from error
+    content = read_yaml(path, GaitFileError)
     try:
         values = content[NODE][KEY]
         items = list(values.items())
@@ -107,6 +102,4 @@ def write_gait(path: Path, values: Mapping[str, float], provenance: Sequence[str
         f"  {KEY}:",
         *(f"    {name}: {float(value)!r}" for name, value in values.items()),
     ]
-    temporary = path.with_name(path.name + ".new")
-    temporary.write_text("\n".join(lines) + "\n")
-    temporary.replace(path)
+    write_lines(path, lines)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
+from tulip_description.yaml_file import read_yaml, write_lines
 
 PATH = Path(__file__).with_name("colours.yaml")
 NODE, KEY, PART = "vision", "ros__parameters", "segmentation"
@@ -45,12 +45,7 @@ def read_colours(path: Path = PATH) -> ColourFile:
     Raises:
         ColourFileError: if it cannot be read, or lacks a class or has something else.
     """
-    try:
-        content = yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise ColourFileError(f"{path} cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ColourFileError(f"{path} is not YAML: {' '.join(str(error).split())}") from error
+    content = read_yaml(path, ColourFileError)
     try:
         part = content[NODE][KEY][PART]
         brightness, colours = part["reference_brightness"], dict(part["colours"])
@@ -91,9 +86,7 @@ def write_colours(path: Path, colours: ColourFile, provenance: Sequence[str] = (
     for name in CLASSES:
         sides = (f"{side}: [{low!r}, {high!r}]" for side, (low, high) in colours.boxes[name].items())
         lines.append(f"        {name}: {{{', '.join(sides)}}}")
-    temporary = path.with_name(path.name + ".new")
-    temporary.write_text("\n".join(lines) + "\n")
-    temporary.replace(path)
+    write_lines(path, lines)
 
 
 def _box(path: Path, name: str, content: Any) -> dict[str, Bounds]:

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
+from tulip_description.yaml_file import read_yaml, write_lines
 from tulip_vision.lens import Lens
 from tulip_vision.lens_models import EQUIDISTANT, EQUISOLID, RECTILINEAR
 
@@ -44,12 +44,7 @@ def read_lens(path: Path, size: tuple[int, int] | None = None) -> Lens:
     Raises:
         LensFileError: if the file cannot be read, is of another form, or describes no lens.
     """
-    try:
-        content = yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise LensFileError(f"{path} cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise LensFileError(f"{path} is not YAML: {' '.join(str(error).split())}") from error
+    content = read_yaml(path, LensFileError)
     try:
         lens = lens_of(content, size)
     except (TypeError, ValueError) as error:
@@ -119,9 +114,7 @@ def write_lens(path: Path, lens: Lens, name: str = "head_camera", provenance: Se
         f"rectification_matrix: {matrix(np.eye(3), 3)}",
         f"projection_matrix: {matrix(projection, 4)}",
     ]
-    temporary = path.with_name(path.name + ".new")
-    temporary.write_text("\n".join(lines) + "\n")
-    temporary.replace(path)
+    write_lines(path, lines)
 
 
 def _numbers(content: Mapping[str, Any], key: str) -> list[float]:

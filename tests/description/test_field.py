@@ -140,10 +140,10 @@ def test_missing_entry_missing_file_and_broken_yaml_are_refused(tmp_path: Path):
     file.write_text(yaml.safe_dump(content), encoding="utf-8")
     with pytest.raises(FieldError, match="goal lacks height"):
         load_field(file)
-    with pytest.raises(FieldError, match="cannot read"):
+    with pytest.raises(FieldError, match="cannot be read"):
         load_field(tmp_path / "absent.yaml")
     file.write_text("field: {length: [", encoding="utf-8")
-    with pytest.raises(FieldError, match="cannot read"):
+    with pytest.raises(FieldError, match="is not YAML"):
         load_field(file)
 
 

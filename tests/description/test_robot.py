@@ -186,7 +186,7 @@ def test_unknown_variant_and_names_are_named_in_errors() -> None:
         ("range: [-1.0, 1.0]", "range: [1.0, -1.0]", "expected lower < upper"),
         ("joint: knee", "joint: elbow", "expected the leg's joints in the order"),
         ("leg_velocity: 15.0", "", "leg_velocity is missing"),
-        ("leg:", "leg: [", "not valid YAML"),
+        ("leg:", "leg: [", "is not YAML"),
     ],
 )
 def test_wrong_parameter_files_are_refused_with_the_place(tmp_path: Path, old: str, new: str, message: str) -> None:

@@ -22,6 +22,7 @@ from typing import Any
 import yaml
 
 from tulip_description.planar import Pose2D
+from tulip_description.yaml_file import read_yaml
 
 FILE, LENS = "recording.yaml", "lens.yaml"
 
@@ -84,12 +85,7 @@ def read_recording(folder: Path) -> tuple[Pose2D, list[Shot]]:
         RecordingError: if it cannot be read or lacks something.
     """
     path = folder / FILE
-    try:
-        content: Any = yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise RecordingError(f"{path} is not YAML: {' '.join(str(error).split())}") from error
+    content: Any = read_yaml(path, RecordingError)
     try:
         place = Pose2D(*(float(content["robot"][name]) for name in ("x", "y", "yaw")))
         entries = list(content["pictures"])
