@@ -23,8 +23,10 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from tulip_description.planar import Pose2D, wrap_angle
+from tulip_description.robot import load_robot
 from tulip_motion.interface import WalkCommand, WalkMode
 from tulip_motion.parameters import MotionParameters
+from tulip_motion.reach import reach
 from tulip_sim.bench.body import Body
 from tulip_sim.bench.push import AFTER, DIRECTIONS, PHASES, time_upright
 from tulip_sim.parameters import WorldParameters
@@ -34,7 +36,7 @@ START = Pose2D(0.0, 40.0, 0.0)  # off the field, where nothing is in the way
 
 SPACE: dict[str, tuple[float, float]] = {
     "com_height": (0.66, 0.735),  # [m] from deep knees to almost straight ones
-    "step_time": (0.34, 0.60),  # [s]
+    "step_time": (0.30, 0.60),  # [s]
     "step_time_growth": (0.0, 0.4),  # [s/(m/s)]
     "double_support_time": (0.03, 0.12),  # [s]
     "first_shift_time": (0.3, 0.8),  # [s]
@@ -66,6 +68,9 @@ SPACE: dict[str, tuple[float, float]] = {
     "max_lean": (0.0, 0.5),  # [rad]
 }
 """Bounds of every parameter in gait.yaml."""
+
+LEAST_SPEEDS = {"forward": 0.62, "backward": 0.31, "sideways": 0.257, "turning": 1.25}
+"""What the legs' reach has to allow a gait [m/s], [rad/s]: a little more than benches ask for."""
 
 WALKS = ("forward", "sideways", "backward", "turn", "start_stop")
 SLIPPERY = WorldParameters(friction=(WorldParameters.friction[0],) * 2)
@@ -122,6 +127,10 @@ class Figures:
         return asdict(self)
 
 
+REFUSED = Figures(0.0, 0.0, 0.0, 2.0, 2.0, 1.0)
+"""What a gait comes to that is not tried."""
+
+
 def check_names(names: Collection[str]) -> None:
     """Check names of parameters to tune.
 
@@ -144,12 +153,15 @@ def evaluate(values: Mapping[str, float], seeds: Collection[int], seconds: float
         seconds: Length of each walk.
 
     Returns:
-        The figures; those of a robot that never stands when the values are refused by MotionParameters.
+        The figures; those of a robot that never stands when the values are refused by MotionParameters, or too slow.
     """
     try:
         parameters = replace(MotionParameters(), **dict(values))  # type: ignore[arg-type]  # all are numbers
+        limits = reach(parameters, load_robot())
     except ValueError:
-        return Figures(0.0, 0.0, 0.0, 2.0, 2.0, 1.0)
+        return REFUSED
+    if any(getattr(limits, name) < least for name, least in LEAST_SPEEDS.items()):
+        return REFUSED
     walks = [try_walk(walk, parameters, seed, seconds) for walk in WALKS for seed in seeds]
     pushes = [share for seed in seeds for share in try_pushes(parameters, seed)]
     means = {name: float(np.mean([walk[name] for walk in walks])) for name in walks[0]}
