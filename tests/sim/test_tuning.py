@@ -17,7 +17,7 @@ from tulip_ros.plan import read_parameters
 from tulip_sim import tuning
 from tulip_sim.bench.push import DIRECTIONS, PHASES
 from tulip_sim.tuner import Tuner, TuningSettings
-from tulip_sim.tuning import SPACE, WEAK_PUSHES, Figures, evaluate, pushes_of, try_pushes, try_walk
+from tulip_sim.tuning import REFUSED, SPACE, WEAK_PUSHES, Figures, evaluate, pushes_of, try_pushes, try_walk
 
 SHORT = ["--trials", "1", "--seeds", "1", "--seconds", "1", "--workers", "1"]
 
@@ -96,6 +96,11 @@ def test_a_gait_that_cannot_walk_costs_more_than_the_committed_one() -> None:
 
 def cost(walk: dict[str, float]) -> float:
     return Figures(pushes=1.0, **walk).cost
+
+
+@pytest.mark.parametrize("gait", [{"step_time": 0.5}, {"stance_width": 0.285, "step_time": 0.38}, {"com_height": 9.0}])
+def test_a_gait_that_is_too_slow_or_impossible_is_not_tried(gait: dict[str, float]) -> None:
+    assert evaluate(gait, range(1), 1e9) == REFUSED
 
 
 def test_two_seeds_are_pushed_in_all_the_weak_ways_and_eighteen_in_every_way_of_the_bench() -> None:
