@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from itertools import product
 from typing import Any
 
@@ -25,7 +24,7 @@ GAITS: dict[str, dict[str, Any]] = {
     "paper": {"gait": "paper"},
     "paper, smooth": {"gait": "paper", "paper_swing": "smooth"},
 }
-LEARNINGS = ("none",)
+LEARNING_GAIT = "dcm"  # the other gaits do not learn over steps
 FALLING = 1.0  # [s] before a fall is detected; errors of a falling robot say nothing of its control
 START = Pose2D(-4.0, 2.2, 0.0)  # the way leads past the goal
 NO_WEIGHTING = "-"  # without feedforward there is nothing to weigh
@@ -34,19 +33,18 @@ NO_WEIGHTING = "-"  # without feedforward there is nothing to weigh
 def combinations() -> list[tuple[str, str, str, str]]:
     """Return gait, feedforward, weighting and learning of each line of the table."""
     lines = []
-    for gait, feedforward, learning in product(GAITS, CHOICES["feedforward"], LEARNINGS):
+    for gait, feedforward in product(GAITS, CHOICES["feedforward"]):
         weightings = (NO_WEIGHTING,) if feedforward == "none" else CHOICES["weight_sharing"]
-        lines += [(gait, feedforward, weighting, learning) for weighting in weightings]
+        learnings = CHOICES["learning"] if gait == LEARNING_GAIT else ("none",)
+        lines += [(gait, feedforward, *pair) for pair in product(weightings, learnings)]
     return lines
 
 
 def parameters(gait: str, feedforward: str, weighting: str, learning: str) -> MotionParameters:
     """Return the parameters of one line."""
-    changes = GAITS[gait] | {"feedforward": feedforward}
+    changes = GAITS[gait] | {"feedforward": feedforward, "learning": learning}
     if weighting != NO_WEIGHTING:
         changes["weight_sharing"] = weighting
-    if "learning" in {field.name for field in fields(MotionParameters)}:
-        changes["learning"] = learning
     return MotionParameters(**changes)
 
 
