@@ -267,7 +267,8 @@ class Motion:
     def _track_ground(self, estimate: Estimate, sensors: Sensors) -> None:
         """Follow base_link over the ground. A robot that lies or sinks is taken to stay where its feet are."""
         estimator = self._estimator
-        x, y = (float(estimate.base_position[i]) - estimator.shift[i] for i in (0, 1))
+        x, y, _ = estimate.base_position.tolist()
+        x, y = x - estimator.shift[0], y - estimator.shift[1]
         if self._started and self._mode not in (MotionMode.LIMP, MotionMode.FALLEN):
             ax, ay, _ = self._tracking.com_acceleration.tolist()
             self._ground.update(estimate, sensors.foot_cells, (ax, ay))

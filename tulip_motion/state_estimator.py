@@ -9,6 +9,7 @@ pose's error add up in the position.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -83,7 +84,7 @@ class StateEstimator:
         self._model = model
         data = self._data = model.createData()
         self._soles = (model.getFrameId(frames.LEFT_SOLE), model.getFrameId(frames.RIGHT_SOLE))
-        self._cells = cell_positions
+        self._cells = cell_positions.tolist()
         self._imu_rotation = imu_rotation
         self._imu_to_base = quaternion_conjugate(tuple(pin.Quaternion(imu_rotation).coeffs().tolist()))
         self._configuration = pin.neutral(model)
@@ -132,9 +133,8 @@ class StateEstimator:
             soles[side] = pin.updateFramePlacement(model, data, frame).homogeneous
         if self._begins:
             self._begin(soles)
-        cells = sensors.foot_cells
-        loads = (sum(cells[0].tolist()), sum(cells[1].tolist()))
-        pressures = [cells[side].dot(self._cells[side]).tolist() for side in (0, 1)]
+        pressures = [_pressure(*pair) for pair in zip(sensors.foot_cells.tolist(), self._cells, strict=True)]
+        loads = (pressures[0][0], pressures[1][0])
         position, velocity, yaw_rates = self._from_feet(left_weight, pressures, loads)
         base_position, base_velocity = np.array(position), np.array(velocity)
         soles[:, :3, 3] += base_position
@@ -154,7 +154,7 @@ class StateEstimator:
             self._dcm(),
             soles,
             yaw_rates,
-            self._centre_of_pressure(pressures, soles, loads),
+            self._centre_of_pressure(pressures, soles),
             loads,
             math.acos(min(max(rotation[2, 2], -1.0), 1.0)),
         )
@@ -185,7 +185,7 @@ class StateEstimator:
         self._tilt_bias = (min(max(x, -most), most), min(max(y, -most), most))
 
     def _from_feet(
-        self, left_weight: float, pressures: list[list[float]], loads: tuple[float, float]
+        self, left_weight: float, pressures: Sequence[Point], loads: tuple[float, float]
     ) -> tuple[Point, Point, tuple[float, float]]:
         """Return position [m] and velocity [m/s] of the base for which the feet that carry stay where they stand.
 
@@ -193,7 +193,7 @@ class StateEstimator:
 
         Args:
             left_weight: As of `update`.
-            pressures: Centre of pressure in the left and right sole, times its load [N m].
+            pressures: Of the left and right sole, see `_pressure`.
             loads: Vertical force on the left and right sole [N].
         """
         x = y = z = vx = vy = vz = 0.0
@@ -211,7 +211,8 @@ class StateEstimator:
             px, py, pz = place.translation.tolist()
             if carries:
                 (xx, xy, _), (yx, yy, _), (zx, zy, _) = place.rotation.tolist()
-                forward, left = pressures[side][0] / loads[side], pressures[side][1] / loads[side]
+                load, forward, left = pressures[side]
+                forward, left = forward / load, left / load
                 rx, ry, rz = xx * forward + xy * left, yx * forward + yy * left, zx * forward + zy * left
                 along, across = self.pivots[side]
                 twist = self._parameters.observer_twist_share * wz
@@ -265,17 +266,29 @@ class StateEstimator:
         (x, y, _), (vx, vy, _) = self._com.tolist(), self._com_velocity.tolist()
         return x + self._time_constant * vx, y + self._time_constant * vy
 
-    def _centre_of_pressure(self, pressures: list[list[float]], soles: Array, loads: tuple[float, float]) -> Array:
+    def _centre_of_pressure(self, pressures: Sequence[Point], soles: Array) -> Array:
         """Return where the cells' forces act together, seen from above."""
-        total = loads[0] + loads[1]
+        total = pressures[0][0] + pressures[1][0]
         if total < self._parameters.contact_force:
             return np.full(2, np.nan)
         x = y = 0.0
-        for (forward, left), sole, load in zip(pressures, soles[:, :2].tolist(), loads, strict=True):
+        for (load, forward, left), sole in zip(pressures, soles[:, :2].tolist(), strict=True):
             (xx, xy, _, px), (yx, yy, _, py) = sole
             x += load * px + xx * forward + xy * left
             y += load * py + yx * forward + yy * left
         return np.array((x / total, y / total))
+
+
+def _pressure(forces: Sequence[float], places: Sequence[Sequence[float]]) -> Point:
+    """Return the force on a sole [N], and its centre in the sole (forward, left) times the force [N m].
+
+    Args:
+        forces: On the four cells [N].
+        places: Of the cells in the sole [m].
+    """
+    a, b, c, d = forces
+    (ax, ay), (bx, by), (cx, cy), (dx, dy) = places
+    return a + b + c + d, a * ax + b * bx + c * cx + d * dx, a * ay + b * by + c * cy + d * dy
 
 
 def planar_pose(transform: Array) -> Pose2D:
