@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 
@@ -27,6 +29,7 @@ BEFORE = 8.0  # [s] of walking in which the phase has to come
 AFTER = 4.0  # [s] to stay upright after the push
 TICKS_PER_SECOND = 1000 / TICK
 BAR = 10.0  # [N s]
+HUB = 2.5  # rings' widths: the picture's empty middle, where a text stands
 
 
 def measure(direction: int, phase: float | None, seed: int) -> Row:
@@ -134,19 +137,23 @@ def draw(rows: Sequence[Row], path: Path) -> None:
             for p in phases
         ]
     )
+    colours = ScalarMappable(Normalize(0, LAST), "RdYlGn")
     width = 2.0 * math.pi / len(DIRECTIONS)
-    edges = np.radians((*DIRECTIONS, 360)) - 0.5 * width
-    mesh = axes.pcolormesh(edges, np.arange(len(phases) + 1) + 1.0, values, vmin=0, vmax=LAST, cmap="RdYlGn")
     for i in range(len(phases)):
+        axes.bar(np.radians(DIRECTIONS), 1.0, width, HUB + i, color=colours.to_rgba(values[i]))
         for j, direction in enumerate(DIRECTIONS):
-            axes.text(math.radians(direction), i + 1.5, str(values[i, j]), ha="center", va="center", fontsize=9)
+            axes.text(math.radians(direction), HUB + i + 0.5, str(values[i, j]), ha="center", va="center", fontsize=9)
     axes.set_theta_zero_location("N")
     axes.set_yticks(
-        np.arange(len(phases)) + 1.5, ["standing" if phase is None else f"{phase:.2f}" for phase in phases], fontsize=7
+        HUB + np.arange(len(phases)) + 0.5,
+        ["" if phase is None else f"{phase:.2f}" for phase in phases],
+        fontsize=7,
     )
     axes.set_thetagrids(DIRECTIONS, ["forward", "", "left", "", "back", "", "right", ""])
     axes.grid(False)
-    figure.colorbar(mesh, label="impulse survived [N s], least of the seeds")
+    if phases[0] is None:
+        axes.text(0.0, 0.0, "inner ring:\nstanding", ha="center", va="center", fontsize=8)
+    figure.colorbar(colours, ax=axes, label="impulse survived [N s], least of the seeds")
     axes.set_title("Pushes by direction and phase of a step on the left foot")
     figure.savefig(path, dpi=110)
 
