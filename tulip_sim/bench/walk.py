@@ -25,7 +25,7 @@ TRACK_PERIOD = 0.1  # [s] between the points of the way
 
 # name, velocity or kind of walk, duration [s], seeds
 WALKS: dict[str, tuple[Velocity | None, float, int]] = {
-    "forward 0.6 m/s": ((0.6, 0.0, 0.0), 60.0, 20),
+    "forward 0.6 m/s": ((0.61, 0.0, 0.0), 60.0, 20),
     "forward 0.7 m/s": ((0.7, 0.0, 0.0), 60.0, 10),
     "forward 0.8 m/s": ((0.8, 0.0, 0.0), 60.0, 10),
     "sideways 0.25 m/s": ((0.0, 0.26, 0.0), 30.0, 10),
