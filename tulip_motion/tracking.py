@@ -161,7 +161,7 @@ class Tracking:
         else:
             (x, y), (vx, vy) = reference.com.position.tolist(), reference.com.velocity.tolist()
             self._stand_on(reference.stance)
-        if self._torso_leads(reference):
+        if self._torso_may_lean(reference):
             # Accelerations lead the torso. Joints that held it upright as well would hold it against the hip strategy,
             # and against the ground when a sole tilts.
             torso, torso_rate = estimate.base_rotation, estimate.angular_velocity
@@ -207,8 +207,8 @@ class Tracking:
         base = anchored * sole.inverse() * data.oMi[1]
         q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
 
-    def _torso_leads(self, reference: Reference) -> bool:
-        """Return whether the torso is where accelerations lead it, upright or for balance; else the joints hold it."""
+    def _torso_may_lean(self, reference: Reference) -> bool:
+        """Return whether accelerations lead the torso, upright or where balance wants it; else the joints hold it."""
         return reference.com is None and not reference.torso_held and self._parameters.feedforward == "full"
 
     def _task_acceleration(
@@ -220,10 +220,11 @@ class Tracking:
         if com is not None:
             return np.array((*com.acceleration.tolist(), 0.0, 0.0, 0.0, 0.5 * foot.yaw_acceleration, *swing))
         x, y, z = estimate.com.tolist()
+        away_x, away_y = balance.cmp if self._torso_may_lean(reference) else balance.zmp
         return np.array(
             (
-                self._omega**2 * (x - balance.cmp[0]),
-                self._omega**2 * (y - balance.cmp[1]),
+                self._omega**2 * (x - away_x),
+                self._omega**2 * (y - away_y),
                 p.height_stiffness * (self._height - z)
                 - p.height_damping * (float(estimate.com_velocity[2]) - height_rate),
                 *self._torso_acceleration(estimate, reference),
@@ -250,7 +251,7 @@ class Tracking:
         if kind == "gravity":
             return feedforward(kinematics, inverse_dynamics(kinematics, np.zeros(18), np.zeros(18)), *sharing)
         dynamics = inverse_dynamics(kinematics, kinematics.velocity, kinematics.solve_acceleration(acceleration))
-        if self._torso_leads(reference):
+        if self._torso_may_lean(reference):
             stance, other = reference.stance, reference.other_standing
             about_x, about_y = turn_for_balance(self._parameters, dynamics.wrench, stance, other)
             if about_x or about_y:
