@@ -30,12 +30,13 @@ BARS = (200.0, 500.0)  # [us] median and 99th percentile of a tick
 PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
     "state estimator": ((StateEstimator, "update"),),
     "gait": ((Motion, "_advance_gait"),),
-    "balance": ((Motion, "_stabilize"),),
+    "ground track": ((Motion, "_track_ground"),),
+    "balance": ((Motion, "_stabilize"), (tracking, "turn_for_balance")),
     "inverse kinematics (10)": tuple(
         (InverseKinematics, name) for name in ("update_jacobian", "solve_velocity", "integrate")
     ),
     "joint accelerations": ((InverseKinematics, "solve_acceleration"),),
-    "feedforward (15)": ((tracking, "feedforward"), (Tracking, "_sharing")),
+    "feedforward (14)-(15)": ((tracking, "inverse_dynamics"), (tracking, "feedforward"), (Tracking, "_sharing")),
 }
 """Functions whose time makes up each part of a tick; what is left is the rest."""
 
