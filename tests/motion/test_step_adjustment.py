@@ -25,12 +25,16 @@ RIGHT_STANDS, LEFT_STANDS = (StepAdjustment(P, REACH, TC, inward) for inward in 
 
 
 def solve(
-    error: Point, remaining: float = REMAINING, foot: Point = (0.05, 0.27), adjustment: StepAdjustment = RIGHT_STANDS
+    error: Point,
+    remaining: float = REMAINING,
+    foot: Point = (0.05, 0.27),
+    adjustment: StepAdjustment = RIGHT_STANDS,
+    extension: float = P.max_step_extension,
 ) -> Landing:
     """Answer a DCM that is off its plan by an error [m] now; the right foot stands, the left one swings at `foot`."""
     decay = math.exp(-remaining / TC)
     dcm = (LANDING_DCM[0] * decay + error[0], LANDING_DCM[1] * decay + error[1])
-    return adjustment.solve(dcm, LANDING_DCM, NOMINAL, foot, remaining, remaining + P.max_step_extension)
+    return adjustment.solve(dcm, LANDING_DCM, NOMINAL, foot, remaining, remaining + extension)
 
 
 def mirrored(point: Point) -> Point:
@@ -95,7 +99,7 @@ def test_pushed_beyond_a_stride_it_lands_early_when_the_foot_is_near(forward: fl
 @pytest.mark.parametrize("forward", [0.2, -0.3])
 def test_the_foot_is_given_the_time_that_its_way_takes(forward: float) -> None:
     foot = (-0.02 * math.copysign(1.0, forward), 0.27)  # still behind
-    landing = solve((forward, 0.0), foot=foot)
+    landing = solve((forward, 0.0), foot=foot, extension=0.3)
     way = math.dist(landing.place, foot)
     assert landing.remaining > REMAINING
     # A swing of minimum jerk is 1.9 times as fast in its middle as on average; the grid of times is 8 ms fine.

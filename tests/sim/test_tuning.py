@@ -128,7 +128,7 @@ def test_a_gait_that_does_not_come_to_the_push_earns_nothing(monkeypatch: pytest
     monkeypatch.setattr(tuning, "pushes_of", lambda seed: [(0, 1.5, 11.0)])
     assert try_pushes(MotionParameters(), 0) == [0.0]
     monkeypatch.setattr(tuning, "pushes_of", lambda seed: [(0, 0.6, 11.0)])
-    falls = replace(MotionParameters(), clik_gain_position=2000.0)
+    falls = replace(MotionParameters(), weight_sharing="distance")
     assert try_pushes(falls, 0) == [0.0]
 
 
