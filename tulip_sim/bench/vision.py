@@ -14,12 +14,10 @@ from tulip_sim.bench.runner import Bench, Row
 from tulip_sim.bench.vision_picture import draw_scenes
 from tulip_sim.bench.vision_real import measure_real, real_table
 from tulip_sim.bench.vision_score import LINE_LIMITS, Judge
-from tulip_sim.bench.vision_shots import shots
+from tulip_sim.bench.vision_shots import shots, vision_of
 from tulip_sim.bench.vision_speed import measure_speed, speed_table
 from tulip_sim.bench.vision_tables import scenes_table
 from tulip_vision.lens import head_camera_lens
-from tulip_vision.opponents import OpponentParameters
-from tulip_vision.pipeline import Vision, VisionParameters
 
 SEEDS = 50  # robots, each of which takes ten pictures
 FASTEST = 6.0  # [ms] median of all stages that is asked for
@@ -34,8 +32,7 @@ def measure_scenes(seed: int) -> Row:
     lines = {"believed": [np.empty(0)], "own": [np.empty(0)]}
     pictures, brightness = 0, 0.0
     for shot in shots(seed):
-        own = OpponentParameters(team_colour=shot.camera.team_colour)
-        features = Vision(VisionParameters(opponents=own), lens).process(shot.picture, shot.stamp, shot.believed)
+        features = vision_of(shot).process(shot.picture, shot.stamp, shot.believed)
         sightings += [each.to_text() for each in judge.sightings(shot, pictures, features)]
         errors = judge.line_errors(shot, features)
         lines["believed"].append(errors.believed)

@@ -12,11 +12,8 @@ from numpy.typing import NDArray
 
 from tulip_sim.bench.runner import Row
 from tulip_sim.bench.vision_score import Sighting
-from tulip_sim.bench.vision_shots import shots
+from tulip_sim.bench.vision_shots import shots, vision_of
 from tulip_sim.bench.vision_tables import RANGES
-from tulip_vision.lens import head_camera_lens
-from tulip_vision.opponents import OpponentParameters
-from tulip_vision.pipeline import Vision, VisionParameters
 
 EACH = 6  # good pictures, and bad ones
 COLUMNS = 3
@@ -70,8 +67,7 @@ def _words(sighting: Sighting) -> str:
 def _frame(seed: int, number: int, words: str) -> NDArray[np.uint8]:
     """Take a picture once more and let vision draw into it."""
     shot = next(islice(shots(seed), number, None))
-    own = OpponentParameters(team_colour=shot.camera.team_colour)
-    vision = Vision(VisionParameters(opponents=own), head_camera_lens())
+    vision = vision_of(shot)
     drawn = vision.annotate(shot.picture, vision.process(shot.picture, shot.stamp, shot.believed))
     frame = cv2.copyMakeBorder(drawn, TITLE_HEIGHT, 0, 0, 0, cv2.BORDER_CONSTANT)
     title = f"seed {seed}, picture {number}, {shot.movement}, {shot.exposure} ms: {words}"

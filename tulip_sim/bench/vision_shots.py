@@ -34,6 +34,9 @@ from tulip_sim.timing import SLOW_TICKS, TICK
 from tulip_sim.truth import Truth
 from tulip_sim.world import World
 from tulip_vision.lens import head_camera_lens
+from tulip_vision.opponents import OpponentParameters
+from tulip_vision.own_body import OwnBody
+from tulip_vision.pipeline import Vision, VisionParameters
 from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParameters
 
 Array = NDArray[np.float64]
@@ -72,6 +75,12 @@ class Shot:
     movement: str
     exposure: int
     camera: CameraParameters
+
+
+def vision_of(shot: Shot) -> Vision:
+    """Return vision as the robot that took a picture has it."""
+    own = OpponentParameters(team_colour=shot.camera.team_colour)
+    return Vision(VisionParameters(opponents=own), head_camera_lens(), OwnBody(load_robot()))
 
 
 class Photographer:

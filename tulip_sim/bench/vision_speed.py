@@ -9,10 +9,12 @@ from typing import Any
 import cv2
 import numpy as np
 
+from tulip_description.robot import load_robot
 from tulip_sim.bench.runner import Row
 from tulip_sim.bench.vision_shots import Shot, shots
 from tulip_vision.lens import head_camera_lens
 from tulip_vision.opponents import OpponentParameters
+from tulip_vision.own_body import OwnBody
 from tulip_vision.pipeline import VisionParameters, stages
 from tulip_vision.view import View
 
@@ -30,7 +32,7 @@ def measure_speed() -> Row:
     for seed in SEEDS:
         taken = list(islice(shots(seed), PICTURES))
         parameters = VisionParameters(opponents=OpponentParameters(team_colour=taken[0].camera.team_colour))
-        order = stages(parameters)
+        order = stages(parameters, OwnBody(load_robot()))
         for shot in taken:  # the first one fills the tables
             _time(shot, order, lens, parameters)
         for shot in taken:
