@@ -51,16 +51,21 @@ class OwnBody:
         tilt = -math.asin(float(np.clip(ahead[2], -1.0, 1.0)))
         eye = camera_in_footprint(self._robot, 0.0, (0.0, 0.0, 0.0, 1.0), pan, tilt)[:3, 3]  # in base_link
         table = view.lens.coarse_ray_table(STEP)
-        rays = table.reshape(-1, 3) @ view.rotation.T.astype(np.float32)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            inverse = (1.0 / rays)[:, None, :]  # (rays, 1, 3); corners of a fisheye's picture are NaN
-            one, other = (self._lower - eye) * inverse, (self._upper - eye) * inverse
-        enter, leave = np.minimum(one, other).max(axis=2), np.maximum(one, other).min(axis=2)
-        met = ((enter < leave) & (leave > 0.0)).any(axis=1).reshape(table.shape[:2])
+        rays = view.rotation.astype(np.float32) @ table.reshape(-1, 3).T
+        with np.errstate(divide="ignore"):
+            inverse = 1.0 / rays  # (3, rays); corners of a fisheye's picture are NaN, and stay so
+        met = np.zeros(rays.shape[1], dtype=np.bool_)
+        lower, upper = (self._lower - eye).astype(np.float32), (self._upper - eye).astype(np.float32)
+        for low, high in zip(lower[..., None], upper[..., None], strict=True):
+            with np.errstate(invalid="ignore"):
+                one, other = low * inverse, high * inverse
+                (x0, y0, z0), (x1, y1, z1) = np.minimum(one, other), np.maximum(one, other)
+                enter, leave = np.maximum(np.maximum(x0, y0), z0), np.minimum(np.minimum(x1, y1), z1)
+                met |= (enter < leave) & (leave > 0.0)
+        blocks = met.reshape(table.shape[:2]).astype(np.uint8) * np.uint8(255)
         rows, columns = view.lens.height, view.lens.width
         if not met.any():
             return np.zeros((rows, columns), dtype=np.uint8)
-        blocks = met.astype(np.uint8) * np.uint8(255)
         size = (blocks.shape[1] * STEP, blocks.shape[0] * STEP)
         fine = cv2.resize(blocks, size, interpolation=cv2.INTER_NEAREST)
         missing = (max(rows - size[1], 0), max(columns - size[0], 0))

@@ -89,6 +89,9 @@ class Sight:
 INPUTS = ("picture", "view")
 """Values that are there before the first stage."""
 
+SMALLEST = 16
+"""[px] width and height of a picture: the search for the carpet looks at two columns of it then."""
+
 DETECTORS = ("ball", "goal_posts", "poles", "opponents", "crossings", "penalty_marks")
 """Values of type `Findings`; their features are the result, together with the lines."""
 
@@ -158,7 +161,12 @@ class Vision:
             parameters: Of all stages.
             lens: Of the camera.
             own_body: The robot's, if its camera may see it.
+
+        Raises:
+            ValueError: if the lens makes pictures too small to show anything.
         """
+        if min(lens.width, lens.height) < SMALLEST:
+            raise ValueError(f"pictures are {lens.width} x {lens.height} px; expected at least {SMALLEST} x {SMALLEST}")
         self._parameters = parameters
         self._lens = lens
         self._stages = stages(parameters, own_body)

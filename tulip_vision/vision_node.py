@@ -62,12 +62,11 @@ class VisionNode(ComponentNode):
     def _on_lens(self, message: CameraInfo) -> None:
         try:
             lens = lens_from_message(message)
+            if self._vision is None or lens.to_camera_info() != self._vision.lens.to_camera_info():
+                self._vision = Vision(self._settings, lens, self._own_body)
+                lens.ray_table()  # 20 ms now instead of at the first picture
         except ValueError as error:
             self.health.count("unusable camera info", f"camera info refused: {error}")
-            return
-        if self._vision is None or lens.to_camera_info() != self._vision.lens.to_camera_info():
-            lens.ray_table()  # 20 ms now instead of at the first picture
-            self._vision = Vision(self._settings, lens, self._own_body)
 
     def _on_odometry(self, message: Odometry) -> None:
         pose = message.pose.pose
