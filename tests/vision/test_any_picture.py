@@ -68,7 +68,9 @@ def test_lenses_of_pictures_too_small_to_show_anything_are_refused(width: int, h
 def test_pictures_with_another_number_of_channels_or_type_are_refused_by_name(channels: int, type_: type) -> None:
     lens = lens_of(64, 48, "plumb_bob")
     with pytest.raises(ValueError, match=r"expected \(48, 64, 3\) uint8"):
-        Vision(VisionParameters(), lens).process(np.zeros((48, 64, channels), type_), 0, pose_of(looking_down(lens, 0.5)))
+        Vision(VisionParameters(), lens).process(
+            np.zeros((48, 64, channels), type_), 0, pose_of(looking_down(lens, 0.5))
+        )
 
 
 @pytest.mark.skipif(not FOLDER.is_dir(), reason=f"the real pictures are not at {FOLDER}")
