@@ -146,7 +146,8 @@ def find_penalty_marks(
         return Findings()
     top = int(close[0])
     white = cv2.compare(segmentation.whiteness[top:], level, cv2.CMP_GT)
-    mask = np.asarray(cv2.bitwise_and(white, segmentation.on_carpet[top:]), dtype=np.uint8)
+    field = cv2.subtract(segmentation.on_carpet[top:], segmentation.own_body[top:])  # light arms are white, too
+    mask = np.asarray(cv2.bitwise_and(white, field), dtype=np.uint8)
     features: list[Feature] = []
     refusals: list[Refusal] = []
     rows, columns = mask.shape

@@ -27,6 +27,8 @@ MOST_CANDIDATES = 8
 
 NEAR_REACH = 0.5
 """[rad] half the angle that an opponent fills whose feet are below the picture: it is less than a metre away."""
+PARTLY_SEEN = 2.5
+"""How many times less sure the place of an opponent is that the picture's edge or the own body hides in part."""
 UPRIGHT_RADIUS = 0.15
 """[m] from the axis of a post or pole up to which what touches the carpet is its foot: the net's and a shadow's too."""
 CARPET = Colour.GREEN | Colour.WHITE
@@ -206,11 +208,14 @@ def _examine(
         < low + 3 * pixel
     ):
         return "the carpet ends beside it, too: it stands behind the carpet"
-    azimuth = _middle(marker, low, distance, segmentation, view, parameters)
+    azimuth, whole = _middle(marker, low, distance, segmentation, view, parameters)
     elevation = -math.atan2(view.height, distance + parameters.depth)
     spread_azimuth, spread_elevation = view.spreads(direction_of(azimuth, elevation), 2.0)
-    across = 0.05 / distance  # [rad] arms and legs make the middle of a body uncertain by 5 cm
-    along = parameters.depth_spread * view.height / (view.height**2 + distance**2)
+    # Arms and legs make the middle of a body uncertain by 5 cm; of one seen in part, the rest may be on either side,
+    # and the foot that is seen need not be the nearer one.
+    unsure = 1.0 if whole else PARTLY_SEEN
+    across = unsure * 0.05 / distance  # [rad]
+    along = unsure * parameters.depth_spread * view.height / (view.height**2 + distance**2)
     return Feature(
         FeatureClass.OPPONENT,
         azimuth,
@@ -356,8 +361,11 @@ def _painted(marker: _Marker, low: float, segmentation: Segmentation, view: View
 
 def _middle(
     marker: _Marker, low: float, distance: float, segmentation: Segmentation, view: View, parameters: OpponentParameters
-) -> float:
-    """Return the azimuth of the body's middle: of what is not carpet between the feet and the carpet's far edge."""
+) -> tuple[float, bool]:
+    """Return the azimuth of the body's middle, and whether all of the body is in view.
+
+    The middle is that of what is not carpet between the feet and the carpet's far edge.
+    """
     half = 1.3 * parameters.half_width / distance
     azimuths = np.linspace(marker.azimuth - half, marker.azimuth + half, 41)
     elevations = np.linspace(low + 0.02 / distance, min(marker.high, low + 0.9 / distance), 12)
@@ -371,12 +379,12 @@ def _middle(
     complete = (inside & (on_carpet != 0)).reshape(shape).all(axis=1)
     rows = complete & body.any(axis=1) & (body.mean(axis=1) < 0.8)
     if np.count_nonzero(rows) < 2:
-        return marker.azimuth
+        return marker.azimuth, bool(inside.all())
     left = np.array([azimuths[row].max() for row in body[rows]])
     right = np.array([azimuths[row].min() for row in body[rows]])
     middle = float(np.median(0.5 * (left + right)))
     # Legs and marker agree on most bodies; where they do not, the truth is between them.
-    return 0.5 * (middle + marker.azimuth)
+    return 0.5 * (middle + marker.azimuth), bool(inside.all())
 
 
 def _angle(first: float, second: float) -> float:
