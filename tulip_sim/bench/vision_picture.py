@@ -15,8 +15,10 @@ from tulip_sim.bench.vision_score import Sighting
 from tulip_sim.bench.vision_shots import shots, vision_of
 from tulip_sim.bench.vision_tables import RANGES
 
-EACH = 6  # good pictures, and bad ones
-COLUMNS = 3
+EACH = 4  # good pictures, and bad ones
+COLUMNS = 4
+SCALE = 0.75  # of the frames
+KEPT = np.uint8(0xF8)  # bits of a colour: the others are the camera's noise, and half of the file
 TITLE_HEIGHT = 22  # [px]
 
 
@@ -69,7 +71,8 @@ def _frame(seed: int, number: int, words: str) -> NDArray[np.uint8]:
     shot = next(islice(shots(seed), number, None))
     vision = vision_of(shot)
     drawn = vision.annotate(shot.picture, vision.process(shot.picture, shot.stamp, shot.believed))
-    frame = cv2.copyMakeBorder(drawn, TITLE_HEIGHT, 0, 0, 0, cv2.BORDER_CONSTANT)
+    small = np.bitwise_and(cv2.resize(drawn, None, fx=SCALE, fy=SCALE, interpolation=cv2.INTER_AREA), KEPT)
+    frame = cv2.copyMakeBorder(small, TITLE_HEIGHT, 0, 0, 0, cv2.BORDER_CONSTANT)
     title = f"seed {seed}, picture {number}, {shot.movement}, {shot.exposure} ms: {words}"
-    cv2.putText(frame, title[:88], (4, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.42, (255, 255, 255), 1, cv2.LINE_AA)
+    cv2.putText(frame, title[:74], (4, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.38, (255, 255, 255), 1, cv2.LINE_AA)
     return np.asarray(frame, np.uint8)
