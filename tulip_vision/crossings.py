@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
 from tulip_vision.lines import Lines
-from tulip_vision.segmentation import Colour, Segmentation, belongs, patches
+from tulip_vision.patches import patches
+from tulip_vision.segmentation import Colour, Segmentation, belongs
 from tulip_vision.view import Array, Mask, View, angles
 
 ARMS = np.array([0.13, 0.17, 0.21, 0.25, 0.29, 0.33])
