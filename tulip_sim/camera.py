@@ -36,6 +36,7 @@ from tulip_vision.lens import Lens
 
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
+Float = NDArray[np.float32]
 
 FLOOR_COLOUR = (112, 118, 122)  # BGR of the hall's floor
 CARPET_COLOUR = (62, 126, 52)
@@ -166,8 +167,25 @@ class CameraRenderer:
             truth: The world.
             rng: Where flicker and noise come from.
         """
-        scene, links = scene_of(truth, self._body, self._parameters.keeper_colour)
-        return self.expose(self.render_scene(self._body.camera_in_map(links), scene), rng)
+        return self.render_over((truth,), rng)
+
+    def render_over(self, truths: Sequence[Truth], rng: np.random.Generator) -> Bytes:
+        """Return the (H, W, 3) BGR picture of a world that moves while light falls in: the mean of its states.
+
+        Args:
+            truths: The world at equal steps of the exposure, at least one.
+            rng: Where flicker and noise come from.
+        """
+        light: Float | None = None
+        for truth in truths:
+            scene, links = scene_of(truth, self._body, self._parameters.keeper_colour)
+            clean = self.render_scene(self._body.camera_in_map(links), scene)
+            if len(truths) == 1:
+                return self.expose(clean, rng)
+            light = clean.astype(np.float32) if light is None else cv2.accumulate(clean, light)
+        if light is None:
+            raise ValueError("no state of the world; expected at least one")
+        return self.expose(cv2.convertScaleAbs(light, alpha=1.0 / len(truths)).astype(np.uint8), rng)
 
     def render_scene(self, camera_in_map: Array, scene: Scene) -> Bytes:
         """Return the (H, W, 3) BGR picture without the camera's own faults: no blur, noise or vignetting.

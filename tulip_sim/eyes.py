@@ -22,6 +22,7 @@ from tulip_sim.camera import CameraParameters, CameraRenderer
 from tulip_sim.truth import Truth
 from tulip_vision.features import Features
 from tulip_vision.lens import head_camera_lens
+from tulip_vision.own_body import OwnBody
 from tulip_vision.pipeline import Vision, VisionParameters
 
 Array = NDArray[np.float64]
@@ -65,8 +66,9 @@ class OwnEyes:
     def __init__(self, parameters: EyesParameters) -> None:
         """Make camera and vision."""
         lens = head_camera_lens()
-        self._camera = CameraRenderer(parameters.camera, load_field(), load_robot(), lens)
-        self._vision = Vision(parameters.vision, lens)
+        robot = load_robot()
+        self._camera = CameraRenderer(parameters.camera, load_field(), robot, lens)
+        self._vision = Vision(parameters.vision, lens, OwnBody(robot))
         self._rng = np.random.default_rng([parameters.seed, 1])
 
     def expose(self, truth: Truth) -> None:

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
-from tulip_vision.segmentation import Colour, Segmentation, belongs, patches
+from tulip_vision.patches import patches
+from tulip_vision.segmentation import Colour, Segmentation, belongs
 from tulip_vision.view import Array, View, angles
 
 MOST_CANDIDATES = 10

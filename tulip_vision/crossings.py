@@ -16,11 +16,15 @@ from numpy.typing import NDArray
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
 from tulip_vision.lines import Lines
-from tulip_vision.segmentation import Colour, Segmentation, belongs, patches
+from tulip_vision.patches import patches
+from tulip_vision.segmentation import Colour, Segmentation, belongs
 from tulip_vision.view import Array, Mask, View, angles
 
 ARMS = np.array([0.13, 0.17, 0.21, 0.25, 0.29, 0.33])
 """[m] Where an arm is looked at: beyond the width of the other line, before the next line of the field begins."""
+MOST_HIDDEN = 2
+"""Of the six samples of an arm: the four others are enough to tell paint from carpet."""
+THINGS = Colour.ORANGE | Colour.YELLOW | Colour.BLUE | Colour.DARK
 BETWEEN = np.array([[a * reach, b * reach] for a in (1.0, -1.0) for b in (1.0, -1.0) for reach in (0.14, 0.2)])
 """(8, 2) places between the arms, along both lines [m]."""
 LEAST_MARK_AREA = 8.0
@@ -143,7 +147,8 @@ def find_penalty_marks(
         return Findings()
     top = int(close[0])
     white = cv2.compare(segmentation.whiteness[top:], level, cv2.CMP_GT)
-    mask = np.asarray(cv2.bitwise_and(white, segmentation.on_carpet[top:]), dtype=np.uint8)
+    field = cv2.subtract(segmentation.on_carpet[top:], segmentation.own_body[top:])  # light arms are white, too
+    mask = np.asarray(cv2.bitwise_and(white, field), dtype=np.uint8)
     features: list[Feature] = []
     refusals: list[Refusal] = []
     rows, columns = mask.shape
@@ -254,8 +259,11 @@ def _shape(
     is_paint = (samples > 0.5 * (paint + carpet)) & seen
     green = belongs(arm_classes, Colour.GREEN).reshape(4, len(ARMS)) & seen
     is_carpet = ~is_paint & green | (samples < carpet + 0.35 * (paint - carpet)) & green
-    has = is_paint.mean(axis=1) >= parameters.least_arm
-    lacks = is_carpet.mean(axis=1) >= parameters.least_arm
+    # A pole, a foot or the ball may stand on an arm's end: what has their colours says nothing.
+    hidden = belongs(arm_classes, THINGS).reshape(4, len(ARMS)) & ~is_paint & ~is_carpet
+    judged = np.where(hidden.sum(axis=1) <= MOST_HIDDEN, (~hidden).sum(axis=1), len(ARMS))
+    has = is_paint.sum(axis=1) >= parameters.least_arm * judged
+    lacks = is_carpet.sum(axis=1) >= parameters.least_arm * judged
     if not (has | lacks).all():
         return None, 0.0, "an arm is hidden or out of the picture"
     return _kind_of(has, place.centre is not None)

@@ -7,6 +7,7 @@ until the carpet begins.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import nan
 
@@ -15,8 +16,9 @@ from numpy.typing import NDArray
 
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
-from tulip_vision.segmentation import Colour, Segmentation, belongs, patches
-from tulip_vision.view import View, angles, direction_of, fan_of
+from tulip_vision.patches import patches
+from tulip_vision.segmentation import Colour, Segmentation, belongs
+from tulip_vision.view import Array, View, angles, direction_of, fan_of
 
 MARKERS = {"cyan": (Colour.CYAN, Colour.MAGENTA), "magenta": (Colour.MAGENTA, Colour.CYAN)}
 """Own marker colour and the opponents', by the own team's colour."""
@@ -26,6 +28,10 @@ MOST_CANDIDATES = 8
 
 NEAR_REACH = 0.5
 """[rad] half the angle that an opponent fills whose feet are below the picture: it is less than a metre away."""
+PARTLY_SEEN = 2.5
+"""How many times less sure the place of an opponent is that the picture's edge or the own body hides in part."""
+UPRIGHT_RADIUS = 0.15
+"""[m] from the axis of a post or pole up to which what touches the carpet is its foot: the net's and a shadow's too."""
 CARPET = Colour.GREEN | Colour.WHITE
 
 
@@ -92,8 +98,17 @@ class _Marker:
         return 0.5 * (self.left + self.right)
 
 
-def find_opponents(segmentation: Segmentation, view: View, parameters: OpponentParameters) -> Findings:
-    """Return opponents: direction of the ground below each; elevation NaN where the feet are not in view."""
+def find_opponents(
+    uprights: Sequence[Feature], segmentation: Segmentation, view: View, parameters: OpponentParameters
+) -> Findings:
+    """Return opponents: direction of the ground below each; elevation NaN where the feet are not in view.
+
+    Args:
+        uprights: Goal posts and poles of the same picture: they stand on the carpet, but are no feet.
+        segmentation: Of the picture.
+        view: Of the picture.
+        parameters: How an opponent is recognised.
+    """
     colour = MARKERS[parameters.team_colour][1]
     found = patches(segmentation.mask(colour), parameters.least_area, MOST_CANDIDATES)
     markers = [_marker(points, area, view) for points, area in found if _compact(points, area)]
@@ -105,7 +120,9 @@ def find_opponents(segmentation: Segmentation, view: View, parameters: OpponentP
             _angle(marker.azimuth, opponent.azimuth) < angle for opponent, angle in zip(opponents, reach, strict=True)
         ):
             continue  # another marker of an opponent already found
-        result = _examine(marker, markers, segmentation, view, parameters)
+        result = _examine(marker, markers, uprights, segmentation, view, parameters)
+        if isinstance(result, Feature) and any(_same(result, other, view, parameters) for other in opponents):
+            result = "part of an opponent already found"
         if isinstance(result, str):
             refusals.append(Refusal(FeatureClass.OPPONENT, marker.pixel, result))
             continue
@@ -115,6 +132,14 @@ def find_opponents(segmentation: Segmentation, view: View, parameters: OpponentP
         else:
             reach.append(1.2 * parameters.half_width * math.tan(-result.elevation) / view.height)
     return Findings(tuple(opponents), tuple(refusals))
+
+
+def _same(one: Feature, other: Feature, view: View, parameters: OpponentParameters) -> bool:
+    """Return whether two opponents would stand in one another."""
+    if math.isnan(one.elevation) or math.isnan(other.elevation):
+        return _angle(one.azimuth, other.azimuth) < NEAR_REACH
+    ground = view.ground(np.stack([direction_of(each.azimuth, each.elevation) for each in (one, other)]))
+    return float(np.linalg.norm(ground[0] - ground[1])) < 2.0 * parameters.half_width
 
 
 def _compact(points: NDArray[np.int32], area: float) -> bool:
@@ -138,7 +163,12 @@ def _marker(points: NDArray[np.int32], area: float, view: View) -> _Marker:
 
 
 def _examine(
-    marker: _Marker, markers: list[_Marker], segmentation: Segmentation, view: View, parameters: OpponentParameters
+    marker: _Marker,
+    markers: list[_Marker],
+    uprights: Sequence[Feature],
+    segmentation: Segmentation,
+    view: View,
+    parameters: OpponentParameters,
 ) -> Feature | str:
     pixel = view.angle_per_pixel(direction_of(marker.azimuth, marker.low))
     middle = math.tan(0.5 * (marker.low + marker.high))
@@ -151,7 +181,7 @@ def _examine(
     # First look: as wide as the markers at the same height together, which is enough to hit a foot or a leg.
     group = _joined(marker, markers, 2.0 * (marker.high - marker.low))
     half = max(0.6 * (group.left - group.right), width) + 2.0 * pixel
-    low = _contact(group, min(half, NEAR_REACH), segmentation, view, pixel)
+    low = _contact(group, min(half, NEAR_REACH), uprights, segmentation, view, pixel)
     if low is None:
         return "no body that stands on the carpet below the marker"
     if math.isnan(low):
@@ -160,7 +190,7 @@ def _examine(
         return "stands beyond the carpet"
     # Second look, with the width that a body has at this range.
     distance = view.height / math.tan(-low)
-    again = _contact(group, parameters.half_width / distance, segmentation, view, pixel)
+    again = _contact(group, parameters.half_width / distance, uprights, segmentation, view, pixel)
     if again is not None and math.isnan(again):
         return _without_feet(marker, markers, view, parameters)
     low = low if again is None else again
@@ -174,11 +204,19 @@ def _examine(
     if not parameters.smallest_marker <= area <= parameters.largest_marker:
         return f"marker of {area:.3f} m^2"
     marker = _joined(marker, markers, 2.0 * parameters.half_width / distance)
-    azimuth = _middle(marker, low, distance, segmentation, view, parameters)
+    if (
+        _carpet_beside(marker.azimuth, low, parameters.half_width / distance, segmentation, view, pixel)
+        < low + 3 * pixel
+    ):
+        return "the carpet ends beside it, too: it stands behind the carpet"
+    azimuth, whole = _middle(marker, low, distance, segmentation, view, parameters)
     elevation = -math.atan2(view.height, distance + parameters.depth)
     spread_azimuth, spread_elevation = view.spreads(direction_of(azimuth, elevation), 2.0)
-    across = 0.05 / distance  # [rad] arms and legs make the middle of a body uncertain by 5 cm
-    along = parameters.depth_spread * view.height / (view.height**2 + distance**2)
+    # Arms and legs make the middle of a body uncertain by 5 cm; of one seen in part, the rest may be on either side,
+    # and the foot that is seen need not be the nearer one.
+    unsure = 1.0 if whole else PARTLY_SEEN
+    across = unsure * 0.05 / distance  # [rad]
+    along = unsure * parameters.depth_spread * view.height / (view.height**2 + distance**2)
     return Feature(
         FeatureClass.OPPONENT,
         azimuth,
@@ -195,7 +233,8 @@ def _without_feet(marker: _Marker, markers: list[_Marker], view: View, parameter
         return "feet out of the picture and the marker small"
     if marker.low + marker.high > 0.2:
         return "feet out of the picture and the marker high up"
-    whole = _joined(marker, markers, NEAR_REACH)
+    # As wide as a body whose markers are so high: shirts of people beyond the field may be at the same height.
+    whole = _joined(marker, markers, min(2.0 * (marker.high - marker.low), NEAR_REACH))
     spread, _ = view.spreads(direction_of(whole.azimuth, whole.low), 3.0)
     return Feature(FeatureClass.OPPONENT, whole.azimuth, nan, math.hypot(spread, 0.05), nan, confidence=0.4)
 
@@ -220,14 +259,18 @@ def _joined(marker: _Marker, markers: list[_Marker], reach: float) -> _Marker:
     )
 
 
-def _contact(marker: _Marker, half: float, segmentation: Segmentation, view: View, pixel: float) -> float | None:
+def _contact(
+    marker: _Marker, half: float, uprights: Sequence[Feature], segmentation: Segmentation, view: View, pixel: float
+) -> float | None:
     """Return the elevation at which the body's lowest point meets the carpet [rad].
 
-    NaN means that the body goes on below the picture; None that no body stands on the carpet there.
+    NaN means that the body goes on below the picture, or behind the own body; None that no body stands on the carpet
+    there.
 
     Args:
         marker: Where to start.
         half: Half the angle of the fan [rad].
+        uprights: Goal posts and poles.
         segmentation: Of the picture.
         view: Of the picture.
         pixel: Angle of one pixel [rad].
@@ -239,21 +282,25 @@ def _contact(marker: _Marker, half: float, segmentation: Segmentation, view: Vie
     if len(elevations) < 4:
         return None  # the marker touches the lower edge of the picture
     pixels = view.pixels_of_directions(fan_of(azimuths, elevations))
-    (classes, on_carpet), inside = view.sample_all((segmentation.classes, segmentation.on_carpet), pixels)
+    images = (segmentation.classes, segmentation.on_carpet, segmentation.own_body)
+    (classes, on_carpet, own_body), inside = view.sample_all(images, pixels)
     shape = (len(elevations), len(azimuths))
+    own = (own_body != 0).reshape(shape)
     # A ball at the feet is no part of the body.
     carpet = (belongs(classes, CARPET | Colour.ORANGE) & (on_carpet != 0)).reshape(shape)
-    seen = inside.reshape(shape)
-    # The carpet begins where three samples in a row are carpet; a single one is noise.
-    begins = carpet[:-2] & carpet[1:-1] & carpet[2:]
+    seen = inside.reshape(shape) & ~own
+    # The carpet begins where three samples in a row are carpet; a single one is noise. What the own body hides, and
+    # all below it, tells nothing.
+    begins = carpet[:-2] & carpet[1:-1] & carpet[2:] & ~np.logical_or.accumulate(own, axis=0)[:-2]
     has = begins.any(axis=0)
     first = begins.argmax(axis=0)
     starts_on_body = ~carpet[0] & seen[0]
     # A body hides carpet: above its foot the picture shows something else inside the carpet's outline.
     painted = belongs(classes, Colour.YELLOW | Colour.BLUE)
-    hides = ~carpet & (on_carpet != 0).reshape(shape) & ~painted.reshape(shape)
+    hides = ~carpet & (on_carpet != 0).reshape(shape) & ~painted.reshape(shape) & ~own
     hidden = np.array([np.count_nonzero(hides[: first[column], column]) for column in range(len(azimuths))])
     standing = has & starts_on_body & (hidden >= 2)
+    standing &= ~_on_upright(azimuths, elevations[np.minimum(first, len(elevations) - 1)], uprights, view, pixel)
     hidden_below = np.count_nonzero(hides, axis=0)
     if np.count_nonzero(starts_on_body & ~has & (hidden_below >= 2)) >= 2:
         return nan  # some cuts leave the picture on the body: its lowest point is not seen
@@ -261,6 +308,48 @@ def _contact(marker: _Marker, half: float, segmentation: Segmentation, view: Vie
         return None
     rows = np.sort(first[standing])
     return float(elevations[rows[-2]]) + 0.25 * step  # the second lowest: one cut may follow a ball or a shadow
+
+
+def _carpet_beside(
+    azimuth: float, low: float, half: float, segmentation: Segmentation, view: View, pixel: float
+) -> float:
+    """Return the elevation up to which there is carpet beside a body [rad], the mean of both sides.
+
+    A body that stands on the carpet hides some of it. What is seen of people behind the carpet seems to stand where
+    the carpet ends, but there it ends beside them too. What the picture does not show counts as carpet.
+
+    Args:
+        azimuth: Of the body's middle [rad].
+        low: Elevation of its lowest point [rad].
+        half: Half the angle that it fills [rad].
+        segmentation: Of the picture.
+        view: Of the picture.
+        pixel: Angle of one pixel [rad].
+    """
+    beside = half * np.array([1.3, 1.7, 2.1, 2.5])
+    azimuths = np.concatenate([azimuth - beside, azimuth + beside])
+    elevations = low + pixel * np.arange(20.0, -4.0, -1.0)
+    pixels = view.pixels_of_directions(fan_of(azimuths, elevations))
+    images = (segmentation.classes, segmentation.on_carpet, segmentation.own_body)
+    (classes, on_carpet, own_body), inside = view.sample_all(images, pixels)
+    carpet = (belongs(classes, CARPET) & (on_carpet != 0)) | ~inside | (own_body != 0)
+    carpet = carpet.reshape(len(elevations), len(azimuths))
+    begins = carpet[:-1] & carpet[1:]  # a single sample is noise
+    tops = np.where(begins.any(axis=0), elevations[begins.argmax(axis=0)], elevations[-1])
+    return 0.5 * float(tops[: len(beside)].max() + tops[len(beside) :].max())
+
+
+def _on_upright(
+    azimuths: Array, lows: Array, uprights: Sequence[Feature], view: View, pixel: float
+) -> NDArray[np.bool_]:
+    """Return (n,) whether places where something meets the carpet, as angles (n,), are feet of goal posts or poles."""
+    found = np.zeros(len(azimuths), dtype=np.bool_)
+    for upright in uprights:
+        if not math.isnan(upright.elevation):
+            half = UPRIGHT_RADIUS * math.tan(-upright.elevation) / view.height + 2.0 * pixel
+            apart = np.abs((azimuths - upright.azimuth + math.pi) % (2.0 * math.pi) - math.pi)
+            found |= (apart < half) & (np.abs(lows - upright.elevation) < half)
+    return found
 
 
 def _painted(marker: _Marker, low: float, segmentation: Segmentation, view: View) -> float:
@@ -273,25 +362,30 @@ def _painted(marker: _Marker, low: float, segmentation: Segmentation, view: View
 
 def _middle(
     marker: _Marker, low: float, distance: float, segmentation: Segmentation, view: View, parameters: OpponentParameters
-) -> float:
-    """Return the azimuth of the body's middle: of what is not carpet between the feet and the carpet's far edge."""
+) -> tuple[float, bool]:
+    """Return the azimuth of the body's middle, and whether all of the body is in view.
+
+    The middle is that of what is not carpet between the feet and the carpet's far edge.
+    """
     half = 1.3 * parameters.half_width / distance
     azimuths = np.linspace(marker.azimuth - half, marker.azimuth + half, 41)
     elevations = np.linspace(low + 0.02 / distance, min(marker.high, low + 0.9 / distance), 12)
     pixels = view.pixels_of_directions(fan_of(azimuths, elevations))
-    (classes, on_carpet), inside = view.sample_all((segmentation.classes, segmentation.on_carpet), pixels)
+    images = (segmentation.classes, segmentation.on_carpet, segmentation.own_body)
+    (classes, on_carpet, own_body), inside = view.sample_all(images, pixels)
+    inside &= own_body == 0
     shape = (len(elevations), len(azimuths))
     other = Colour.ORANGE | Colour.YELLOW | Colour.BLUE
     body = (~belongs(classes, CARPET | other) & inside & (on_carpet != 0)).reshape(shape)
     complete = (inside & (on_carpet != 0)).reshape(shape).all(axis=1)
     rows = complete & body.any(axis=1) & (body.mean(axis=1) < 0.8)
     if np.count_nonzero(rows) < 2:
-        return marker.azimuth
+        return marker.azimuth, bool(inside.all())
     left = np.array([azimuths[row].max() for row in body[rows]])
     right = np.array([azimuths[row].min() for row in body[rows]])
     middle = float(np.median(0.5 * (left + right)))
     # Legs and marker agree on most bodies; where they do not, the truth is between them.
-    return 0.5 * (middle + marker.azimuth)
+    return 0.5 * (middle + marker.azimuth), bool(inside.all())
 
 
 def _angle(first: float, second: float) -> float:

@@ -19,6 +19,7 @@ from tulip_vision.lens import Lens
 from tulip_vision.line_points import LinePointParameters, find_line_points
 from tulip_vision.lines import LineParameters, Lines, find_lines, line_features
 from tulip_vision.opponents import OpponentParameters, find_opponents
+from tulip_vision.own_body import OwnBody
 from tulip_vision.poles import PoleParameters, find_poles
 from tulip_vision.segmentation import Picture, Segmentation, SegmentationParameters, Segmenter
 from tulip_vision.view import SpreadParameters, View
@@ -88,21 +89,35 @@ class Sight:
 INPUTS = ("picture", "view")
 """Values that are there before the first stage."""
 
+SMALLEST = 16
+"""[px] width and height of a picture: the search for the carpet looks at two columns of it then."""
+
 DETECTORS = ("ball", "goal_posts", "poles", "opponents", "crossings", "penalty_marks")
 """Values of type `Findings`; their features are the result, together with the lines."""
 
 
-def stages(parameters: VisionParameters) -> tuple[Stage, ...]:
-    """Return the stages in the order in which they run."""
+def stages(parameters: VisionParameters, own_body: OwnBody | None = None) -> tuple[Stage, ...]:
+    """Return the stages in the order in which they run.
+
+    Args:
+        parameters: Of all stages.
+        own_body: The robot's, if its camera may see it.
+    """
     p = parameters
     segmenter = Segmenter(p.segmentation)
     seen = ("segmentation", "view")
     return (
-        Stage("segment", ("picture", "view"), "segmentation", segmenter.segment),
+        Stage("find own body", ("view",), "own_body", lambda v: None if own_body is None else own_body.mask(v)),
+        Stage("segment", ("picture", "view", "own_body"), "segmentation", segmenter.segment),
         Stage("find ball", seen, "ball", lambda s, v: find_ball(s, v, p.ball)),
         Stage("find goal posts", seen, "goal_posts", lambda s, v: find_goal_posts(s, v, p.goals)),
         Stage("find poles", seen, "poles", lambda s, v: find_poles(s, v, p.poles)),
-        Stage("find opponents", seen, "opponents", lambda s, v: find_opponents(s, v, p.opponents)),
+        Stage(
+            "find opponents",
+            ("goal_posts", "poles", *seen),
+            "opponents",
+            lambda g, q, s, v: find_opponents((*g.features, *q.features), s, v, p.opponents),
+        ),
         Stage("find line points", seen, "line_points", lambda s, v: find_line_points(s, v, p.line_points)),
         Stage("join lines", ("line_points", "view"), "lines", lambda q, v: find_lines(q, v, p.lines)),
         Stage(
@@ -139,16 +154,22 @@ def check_stages(order: Sequence[Stage]) -> None:
 class Vision:
     """Finds ball, goal posts, poles, opponents, lines and crossings in pictures of one camera."""
 
-    def __init__(self, parameters: VisionParameters, lens: Lens) -> None:
+    def __init__(self, parameters: VisionParameters, lens: Lens, own_body: OwnBody | None = None) -> None:
         """Make the pipeline.
 
         Args:
             parameters: Of all stages.
             lens: Of the camera.
+            own_body: The robot's, if its camera may see it.
+
+        Raises:
+            ValueError: if the lens makes pictures too small to show anything.
         """
+        if min(lens.width, lens.height) < SMALLEST:
+            raise ValueError(f"pictures are {lens.width} x {lens.height} px; expected at least {SMALLEST} x {SMALLEST}")
         self._parameters = parameters
         self._lens = lens
-        self._stages = stages(parameters)
+        self._stages = stages(parameters, own_body)
         check_stages(self._stages)
         self._last: Sight | None = None
 

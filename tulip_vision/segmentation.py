@@ -39,6 +39,10 @@ class Colour(IntFlag):
     DARK = 128
 
 
+FIELD = np.uint8(Colour.GREEN | Colour.ORANGE | Colour.YELLOW | Colour.BLUE)
+"""What a robot's own body does not wear, by the rules."""
+
+
 @dataclass(frozen=True)
 class ColourBox:
     """A box of colours.
@@ -149,6 +153,7 @@ class Segmentation:
         whiteness: (height, width) the smaller of red and blue, 0 to 255: low on carpet, high on lines.
         on_carpet: (height, width) 255 inside the carpet's outline, else 0.
         outline: (n, 2) the outline's upper edge, left to right [px]; empty if no carpet is seen.
+        own_body: (height, width) 255 where the robot sees its own trunk and arms, else 0; no class there.
         brightness: Value of the carpet over the reference brightness; 1 if no carpet is seen.
         carpet_share: Share of the pixels that are green, 0 to 1.
     """
@@ -157,6 +162,7 @@ class Segmentation:
     whiteness: Mask
     on_carpet: Mask
     outline: Array
+    own_body: Mask
     brightness: float
     carpet_share: float
 
@@ -189,13 +195,25 @@ class Segmenter:
             self._tables[level] = self._make_table(math.exp(level * step))
         return self._tables[level]
 
-    def segment(self, picture: Picture, view: View) -> Segmentation:
-        """Divide a picture, (height, width, 3) BGR, into colour classes and find the carpet's outline."""
+    def segment(self, picture: Picture, view: View, own_body: Mask | None = None) -> Segmentation:
+        """Divide a picture into colour classes and find the carpet's outline.
+
+        Args:
+            picture: (height, width, 3) BGR.
+            view: Of the picture.
+            own_body: (height, width) 255 where the robot may see itself; None if it does not.
+        """
         brightness = self._brightness(picture)
         packed = cv2.cvtColor(picture, cv2.COLOR_BGR2BGR555)  # two bytes a pixel, little-endian: 0rrrrrgg gggbbbbb
         index = packed.view(np.uint16).reshape(picture.shape[:2])
         classes: Mask = np.take(self.table(brightness), index, mode="wrap")  # every index is inside: saves the check
         whiteness: Mask = cv2.min(cv2.extractChannel(picture, 0), cv2.extractChannel(picture, 2))
+        if own_body is None:
+            own_body = np.zeros(classes.shape, dtype=np.uint8)
+        elif own_body.any():
+            # Where the trunk leans otherwise than thought, the field shows, in colours that the own body has not.
+            own_body = np.asarray(cv2.bitwise_and(own_body, cv2.compare(classes & FIELD, 0, cv2.CMP_EQ)), np.uint8)
+            classes = np.asarray(cv2.bitwise_and(classes, cv2.bitwise_not(own_body)), np.uint8)
         outline = self._outline(classes, view)
         on_carpet: Mask = np.zeros(classes.shape, dtype=np.uint8)
         if len(outline):
@@ -204,7 +222,7 @@ class Segmenter:
             cv2.fillPoly(on_carpet, [polygon], 255)
         sampled = belongs(classes[::8, ::8], Colour.GREEN)
         share = float(np.count_nonzero(sampled)) / max(sampled.size, 1)
-        return Segmentation(classes, whiteness, on_carpet, outline, brightness, share)
+        return Segmentation(classes, whiteness, on_carpet, outline, own_body, brightness, share)
 
     def _make_table(self, brightness: float) -> NDArray[np.uint8]:
         hue, saturation, value = self._cells
@@ -288,37 +306,6 @@ class Segmenter:
         across = np.linspace(flat[:, 0].min(), flat[:, 0].max(), 41)
         height = np.interp(across, flat[hull, 0], flat[hull, 1])
         return _picture_edge(_from_level_plane(view, np.stack([across, height], axis=1)), view, 3.0 * step)
-
-
-def patches(
-    mask: Mask, least_area: float, most: int, corner: tuple[int, int] = (0, 0)
-) -> list[tuple[NDArray[np.int32], float]]:
-    """Return the connected patches of a mask, largest first, those inside the holes of others too.
-
-    Args:
-        mask: (height, width) nonzero inside the patches.
-        least_area: Smaller ones are left out [px^2].
-        most: Largest number of patches.
-        corner: u, v in the picture of the mask's first pixel, where the mask is of a part of the picture.
-
-    Returns:
-        For each patch its outer contour, (n, 2) u and v [px], and its area without regard to holes [px^2].
-    """
-    contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE, offset=corner)
-    if hierarchy is None:
-        return []
-    shortest = 4.0 * (math.sqrt(least_area) - 1.0)  # of a contour round that area: a square's
-    found = []
-    for contour, parent in zip(contours, hierarchy.reshape(-1, 4)[:, 3].tolist(), strict=True):
-        if parent >= 0 or len(contour) < shortest:
-            continue  # the edge of a hole, or noise
-        points: NDArray[np.int32] = contour.reshape(-1, 2)
-        # The contour runs through the middles of the edge pixels: half a pixel is missing all around.
-        area = float(cv2.contourArea(contour)) + 0.5 * len(points) + 1.0
-        if area >= least_area:
-            found.append((points, area))
-    found.sort(key=lambda patch: patch[1], reverse=True)
-    return found[:most]
 
 
 def _large_parts(filled: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tulip_vision.segmentation import Colour, Segmentation, belongs, patches
+from tulip_vision.patches import patches
+from tulip_vision.segmentation import Colour, Segmentation, belongs
 from tulip_vision.view import Array, Mask, View, angles, direction_of, fan_of
 
 MOST_CANDIDATES = 12

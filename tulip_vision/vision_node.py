@@ -17,6 +17,7 @@ from tulip_ros.errors import BadInputError
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.time import stamp_of
 from tulip_vision.messages import features_to_message, lens_from_message, picture_from_message, picture_to_message
+from tulip_vision.own_body import OwnBody
 from tulip_vision.pipeline import Vision, VisionParameters
 from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParameters
 
@@ -37,6 +38,7 @@ class VisionNode(ComponentNode):
         cv2.setNumThreads(1)  # the robot's other nodes need the other cores
         self._settings = self.load(VisionParameters())
         self._robot = load_robot()
+        self._own_body = OwnBody(self._robot)
         try:
             self._mount = load_mount()
         except MountFileError as error:
@@ -55,17 +57,16 @@ class VisionNode(ComponentNode):
         self._poses = PoseBuffer(PoseBufferParameters(), partial(camera_in_footprint, self._robot, mount=self._mount))
         self._pictures: deque[Image] = deque()
         if self._vision is not None:
-            self._vision = Vision(self._settings, self._vision.lens)
+            self._vision = Vision(self._settings, self._vision.lens, self._own_body)
 
     def _on_lens(self, message: CameraInfo) -> None:
         try:
             lens = lens_from_message(message)
+            if self._vision is None or lens.to_camera_info() != self._vision.lens.to_camera_info():
+                self._vision = Vision(self._settings, lens, self._own_body)
+                lens.ray_table()  # 20 ms now instead of at the first picture
         except ValueError as error:
             self.health.count("unusable camera info", f"camera info refused: {error}")
-            return
-        if self._vision is None or lens.to_camera_info() != self._vision.lens.to_camera_info():
-            lens.ray_table()  # 20 ms now instead of at the first picture
-            self._vision = Vision(self._settings, lens)
 
     def _on_odometry(self, message: Odometry) -> None:
         pose = message.pose.pose

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from test_segmentation import looking_down
 
+from tulip_sim.bench.vision_real import FOLDER as PICTURES
 from tulip_vision.ball import BallParameters
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.lens import Lens
 from tulip_vision.pipeline import Vision, VisionParameters
 from tulip_vision.view import direction_of
-
-PICTURES = Path(__file__).parents[3] / "shared" / "data" / "real_images"
 
 WITH_RED_BALL = {"image0000011.jpg", "image0000019.jpg"}
 

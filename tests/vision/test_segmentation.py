@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tulip_vision.lens import Lens, head_camera_lens
-from tulip_vision.segmentation import Colour, ColourBox, SegmentationParameters, Segmenter, patches
+from tulip_vision.patches import patches
+from tulip_vision.segmentation import Colour, ColourBox, SegmentationParameters, Segmenter
 from tulip_vision.view import SpreadParameters, View
 
 CARPET = (44, 128, 58)

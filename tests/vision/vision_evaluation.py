@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,10 @@ from tulip_description.field import Field
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_description.posture import standing_posture
 from tulip_description.robot import Robot
+from tulip_sim.bench.vision_truth import GROUPS, Thing, things
+from tulip_sim.scene import Body, scene_of
 from tulip_sim.truth import Truth
-from tulip_vision.features import Feature, FeatureClass, Features
+from tulip_vision.features import Feature, Features
 from tulip_vision.pipeline import Vision
 from tulip_vision.view import View
 
@@ -44,23 +46,6 @@ class Scene:
     joints: Array
     ball: Array
     keeper: Pose2D
-
-
-@dataclass(frozen=True)
-class Thing:
-    """Something that a picture shows.
-
-    Attributes:
-        kinds: Classes that it may be reported as.
-        point: (3,) in base_footprint [m].
-        distance: Along the ground from the camera [m].
-        required: True where vision must find it; else it may.
-    """
-
-    kinds: tuple[FeatureClass, ...]
-    point: Array
-    distance: float
-    required: bool
 
 
 @dataclass
@@ -91,14 +76,6 @@ class Tally:
         )
 
 
-GROUPS: dict[str, tuple[FeatureClass, ...]] = {
-    "ball": (FeatureClass.BALL,),
-    "post": (FeatureClass.GOAL_POST,),
-    "pole": (FeatureClass.POLE_YELLOW_BLUE_YELLOW, FeatureClass.POLE_BLUE_YELLOW_BLUE),
-    "opponent": (FeatureClass.OPPONENT,),
-    "crossing": (FeatureClass.CROSSING_L, FeatureClass.CROSSING_T, FeatureClass.CROSSING_X),
-    "mark": (FeatureClass.PENALTY_MARK,),
-}
 RANGES = {"ball": 6.0, "post": 9.0, "pole": 7.0, "opponent": 8.0, "crossing": 5.0, "mark": 3.0}
 """[m] up to here a thing must be found."""
 MATCH = math.radians(2.0)
@@ -169,65 +146,6 @@ def camera_pose(scene: Scene, robot: Robot) -> Array:
     return camera_in_footprint(robot, scene.height, scene.orientation, float(pan), float(tilt))
 
 
-def things(scene: Scene, field: Field, view: View, opponent_half_width: float = 0.25) -> dict[str, list[Thing]]:
-    """Return what the picture of a scene shows, by the names of `GROUPS`."""
-    to_robot = scene.footprint.inverse()
-
-    def local(x: float, y: float, z: float) -> Array:
-        return np.array([*to_robot.transform((x, y)), z])
-
-    keeper = local(scene.keeper.x, scene.keeper.y, 0.0)
-    ball = local(*scene.ball)
-    posts = [local(post.x, post.y, 0.0) for post in field.goal_posts]
-    poles = [(local(pole.x, pole.y, 0.0), pole) for pole in field.poles]
-    solids = [(keeper, opponent_half_width + 0.05, 1.3), (ball * [1, 1, 0], field.ball_radius, 2 * field.ball_radius)]
-    solids += [(post, 0.07, 1.9) for post in posts]
-    solids += [(foot, pole.radius + 0.02, pole.height) for foot, pole in poles]
-
-    def seen(point: Array, own: int | None, margin: float) -> bool:
-        if not view.inside(view.pixels(point[None]), margin)[0] or math.hypot(point[0], point[1]) < 0.55:
-            return False
-        return all(not _blocks(view.position, point, *solid) for index, solid in enumerate(solids) if index != own)
-
-    kinds = {"L": FeatureClass.CROSSING_L, "T": FeatureClass.CROSSING_T, "X": FeatureClass.CROSSING_X}
-    found: dict[str, list[Thing]] = {name: [] for name in GROUPS}
-
-    def add(name: str, these: tuple[FeatureClass, ...], point: Array, whole: bool) -> None:
-        distance = math.hypot(*(point[:2] - view.position[:2]))
-        found[name].append(Thing(these, point, distance, whole and distance <= RANGES[name]))
-
-    add("ball", GROUPS["ball"], ball, seen(ball, 1, 6.0))
-    around = [np.array([math.cos(turn), math.sin(turn), 0.0]) for turn in np.linspace(0.0, 2 * math.pi, 8)]
-    add(
-        "opponent",
-        GROUPS["opponent"],
-        keeper,
-        all(seen(keeper + offset, 0, 0.0) for offset in (*(0.25 * each for each in around), np.array([0, 0, 0.95])))
-        and math.hypot(keeper[0], keeper[1]) > 0.9,
-    )
-    for index, post in enumerate(posts):
-        add(
-            "post",
-            GROUPS["post"],
-            post,
-            all(seen(post + np.array([0, 0, z]), 2 + index, 8.0) for z in (0.0, 0.15, 0.4, 0.8)),
-        )
-    for index, (foot, pole) in enumerate(poles):
-        yellow_first = pole.colours[0] == "yellow"
-        kind = FeatureClass.POLE_YELLOW_BLUE_YELLOW if yellow_first else FeatureClass.POLE_BLUE_YELLOW_BLUE
-        near = pole.radius * (view.position - foot) / np.linalg.norm(view.position[:2] - foot[:2]) * [1, 1, 0]
-        whole = all(seen(foot + near + [0, 0, z], 6 + index, 15.0) for z in (0.0, 0.3, 0.55))
-        add("pole", (kind,), foot, whole)
-    for crossing in field.crossings:
-        point = local(crossing.x, crossing.y, 0.0)
-        whole = all(seen(point + 0.36 * each, None, 4.0) for each in around) and seen(point, None, 4.0)
-        add("crossing", (kinds[crossing.kind.value],), point, whole)
-    for mark in field.penalty_marks:
-        point = local(*mark, 0.0)
-        add("mark", GROUPS["mark"], point, all(seen(point + 0.2 * each, None, 2.0) for each in around))
-    return found
-
-
 def evaluate(
     scenes: Iterable[Scene],
     render: Callable[[Scene], NDArray[np.uint8]],
@@ -247,13 +165,15 @@ def evaluate(
         inspect: Called with each picture's number, the picture, the features and what was wrong.
     """
     tallies = {name: Tally() for name in GROUPS}
+    body = Body(robot, "cyan")
     for number, scene in enumerate(scenes):
         picture = render(scene)
         features = vision.process(picture, number, camera_pose(scene, robot))
         assert vision.last is not None
         view = vision.last.view
         problems: list[str] = []
-        for name, present in things(scene, field, view).items():
+        own, _ = scene_of(replace(truth_of(scene), keeper=None), body, "cyan")
+        for name, present in things(truth_of(scene), own.boxes, field, view).items():
             found = [each for each in features.features if each.kind in GROUPS[name]]
             _compare(name, present, found, view, tallies[name], problems)
         if inspect is not None:
@@ -265,7 +185,8 @@ def _compare(
     name: str, present: list[Thing], found: list[Feature], view: View, tally: Tally, problems: list[str]
 ) -> None:
     left = list(found)
-    for thing in sorted(present, key=lambda each: not each.required):
+    for thing in sorted(present, key=lambda each: not each.whole):
+        required = thing.whole and thing.distance <= RANGES[name]
         ray = thing.point - view.position
         azimuth = math.atan2(ray[1], ray[0])
         elevation = math.atan2(ray[2], math.hypot(ray[0], ray[1]))
@@ -276,14 +197,14 @@ def _compare(
 
         match = max(MATCH, BODY_MATCH / thing.distance) if name == "opponent" else MATCH
         fitting = [each for each in left if each.kind in thing.kinds and off(each) < match]
-        tally.there += thing.required
+        tally.there += required
         if not fitting:
-            if thing.required:
+            if required:
                 problems.append(f"missed {name} {thing.kinds[0].name} at {thing.distance:.1f} m")
             continue
         best = min(fitting, key=off)
         left.remove(best)
-        if thing.required:
+        if required:
             tally.found += 1
             error = abs(wrap_angle(best.azimuth - azimuth))
             tally.azimuth_errors.append(error)
@@ -296,14 +217,6 @@ def _compare(
         problems.append(
             f"false {extra.kind.name} at {math.degrees(extra.azimuth):.1f}, {math.degrees(extra.elevation):.1f} deg"
         )
-
-
-def _blocks(eye: Array, point: Array, foot: Array, radius: float, height: float) -> bool:
-    """Return whether an upright cylinder hides a point from the eye."""
-    along = np.linspace(0.02, 0.98, 60)[:, None]
-    sight = eye + along * (point - eye)
-    near = np.hypot(sight[:, 0] - foot[0], sight[:, 1] - foot[1]) < radius
-    return bool((near & (sight[:, 2] < height)).any())
 
 
 def _place_ahead(
