@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from tulip_description.camera_mount import load_mount
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.field import Field, load_field
+from tulip_description.planar import Pose2D
 from tulip_description.robot import Robot, load_robot
 from tulip_description.robot_io import JointCommand
 from tulip_motion.head import HeadMovement, HeadParameters
@@ -75,6 +76,7 @@ class Lockstep:
         settings: Settings | None = None,
         listener: Listener | None = None,
         eyes_beside: bool = False,
+        belief: Pose2D | None = None,
     ) -> None:
         """Wire the cores.
 
@@ -86,6 +88,7 @@ class Lockstep:
             listener: Told of every message that the graph would carry.
             eyes_beside: Let camera and vision work in a process of their own: faster where a core is free.
                 Call `close` at the end then. The trial is the same.
+            belief: Where the robot is told to stand, if that is not where it stands.
         """
         settings = settings or Settings()
         robot_field: Field = load_field()
@@ -99,7 +102,7 @@ class Lockstep:
         else:
             self._eyes = EyesBeside(eyes) if eyes_beside else OwnEyes(eyes)
         self._poses = PoseBuffer(PoseBufferParameters(), partial(camera_in_footprint, robot, mount=load_mount()))
-        self.world_model = WorldModel(settings.worldmodel, robot_field, scenario.robot)
+        self.world_model = WorldModel(settings.worldmodel, robot_field, belief or scenario.robot)
         self.motion = Motion(settings.motion, robot)
         self.head = HeadMovement(settings.head, robot)
         self.strategy = Strategy(settings.strategy, robot_field)
@@ -187,8 +190,11 @@ class Lockstep:
         if self._exposed is not None and not self._looking:
             pose = self._poses.camera_in_footprint(self._exposed)
             if not isinstance(pose, MissingPose):
-                self._eyes.look(self._exposed, pose)
-                self._looking = True
+                if pose[2, 3] > 0.0:
+                    self._eyes.look(self._exposed, pose)
+                    self._looking = True
+                else:
+                    self._exposed = None  # a fallen robot's belief puts the camera below the ground: nothing to see
         # Vision beside this process has until then to work.
         if self._exposed is not None and self._looking and now - self._exposed >= min(LATENCY, self._eyes.latency):
             self._seen.append(self._eyes.collect())
