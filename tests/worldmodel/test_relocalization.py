@@ -159,20 +159,17 @@ def test_seeds_of_an_exact_picture_hold_the_true_pose_first_and_its_mirror_image
     assert best.log_weight - mirrored[0].log_weight == pytest.approx(expected, abs=0.1)
 
 
-def test_covariance_of_two_hypotheses_spans_both() -> None:
-    moments = kidnapped(TARGETS[0], 3.0, FIELD, 5)
-    world = WorldModel(WorldModelParameters(localization=ROUGH), FIELD, START)
-    spread = 0.0
-    for moment in moments:
-        world.add_odometry(moment.odometry)
-        if moment.features is not None:
-            world.add_features(moment.features)
-        found = world.localization.hypotheses
-        assert sum(weight for _, weight in found) == pytest.approx(1.0)
-        apart = sum(weight * math.dist((pose.x, pose.y), (found[0][0].x, found[0][0].y)) ** 2 for pose, weight in found)
-        spread = max(spread, apart)
-        assert np.trace(world.localization.covariance[:2, :2]) > apart
-    assert spread > 0.01
+def test_without_a_heading_and_without_poles_both_halves_stay_possible_and_the_covariance_spans_both() -> None:
+    blind = replace(ROUGH, heading_continuity=100.0)  # [rad] any heading is as likely as any other
+    course = follow(kidnapped(TARGETS[0], 5.0, BARE, 5), START, BARE, blind)
+    localization = course.world.localization
+    (first, first_weight), (second, second_weight) = localization.hypotheses[:2]
+    assert first_weight + second_weight > 0.9
+    assert abs(wrap_angle(first.yaw - second.yaw)) == pytest.approx(math.pi, abs=0.1)
+    assert math.hypot(first.x + second.x, first.y + second.y) < 0.3
+    assert localization.lost
+    apart = second_weight * math.dist((first.x, first.y), (second.x, second.y)) ** 2
+    assert np.trace(localization.covariance[:2, :2]) > apart > 1.0
 
 
 def test_odometry_that_says_it_slipped_adds_exactly_that_to_the_position() -> None:
