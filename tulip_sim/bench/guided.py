@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_description.planar import Pose2D, wrap_angle
-from tulip_motion.interface import HeadCommand, HeadMode, WalkCommand, WalkMode
+from tulip_motion.interface import HeadCommand, HeadMode, MotionMode, WalkCommand, WalkMode
 from tulip_sim.lockstep import Lockstep, Settings
 from tulip_sim.scenario import Scenario
 
@@ -18,6 +18,7 @@ ARRIVED = 0.25  # [m] from a place, from where the next one is the goal
 SPEED = 0.3  # [m/s]
 TURN = 0.6  # [rad/s] at most
 TURN_GAIN = 1.5  # [1/s] turning rate by the bearing of the goal
+LIMP_TICKS = 8  # of legs without stiffness before they are lifted: commands come at 50 Hz
 ASIDE = math.radians(50.0)  # a goal further aside is turned to before the robot walks
 
 
@@ -44,20 +45,38 @@ class GuidedWalk(Lockstep):
         super().__init__(scenario, seed, settings, belief=belief)
         self._places = list(places)
         self._next = 0
+        self._limp = False
+
+    def compare(self) -> tuple[Pose2D, Pose2D, Array]:
+        """Return base_footprint in map as it is and as it is believed to be, and the (3, 3) covariance of the belief.
+
+        The truth is that of the belief's stamp: what the body moved since then is taken off.
+        """
+        world, truth = self.world_model.state(self.stamp), self.world.truth()
+        late = (truth.stamp - world.stamp) * 1e-9
+        there = truth.footprint
+        vx, vy = truth.base_linear_velocity[:2].tolist()
+        yaw = there.yaw - late * float(truth.base_angular_velocity[2])
+        return Pose2D(there.x - late * vx, there.y - late * vy, yaw), world.robot.pose, world.robot.covariance
+
+    def carry(self, target: Pose2D) -> None:
+        """Let a person carry the robot elsewhere: legs limp, set down upright; nobody tells the robot."""
+        self._limp = True
+        for _ in range(LIMP_TICKS):
+            self.step()
+        self.world.set_upright(target)
+        self._limp = False
 
     @property
-    def estimate(self) -> tuple[Pose2D, Array]:
-        """base_footprint in map as believed now, with its (3, 3) covariance."""
-        robot = self.world_model.state(self.stamp).robot
-        return robot.pose, robot.covariance
-
-    def error(self) -> Array:
-        """Return (3,) believed minus true pose: x, y [m], yaw [rad]."""
-        pose, truth = self.estimate[0], self.world.truth().footprint
-        return np.array([pose.x - truth.x, pose.y - truth.y, wrap_angle(pose.yaw - truth.yaw)])
+    def fallen(self) -> bool:
+        """Whether motion control has detected a fall."""
+        return self.motion.mode is MotionMode.FALLEN
 
     def _decide(self, stamp: int) -> None:
         """Command legs and head by the script."""
+        if self._limp:
+            self.motion.command(WalkCommand(stamp, WalkMode.LIMP))
+            return
         velocity = self._velocity(self.world_model.state(stamp).robot.pose) if self._places else None
         mode = WalkMode.STAND if velocity is None else WalkMode.WALK
         self.motion.command(WalkCommand(stamp, mode, velocity or (0.0, 0.0, 0.0)))
