@@ -268,8 +268,8 @@ def _about_walks(walks: Sequence[Row]) -> list[str]:
     if len(samples):
         lines.append(
             f"- consistency: NEES of (x, y, yaw) below its 95 % bound {BOUND:.2f} in"
-            f" {100.0 * np.mean(samples < BOUND):.1f} % of {len(samples)} looks (bar: 95 %); mean {samples.mean():.2f} (3 if the covariance is exact, less if it"
-            " is too careful)"
+            f" {100.0 * np.mean(samples < BOUND):.1f} % of {len(samples)} looks (bar: 95 %);"
+            f" mean {samples.mean():.2f} (3 if the covariance is exact, less if it is too careful)"
         )
     if whole:
         low, high = bounds(len(whole))
