@@ -18,9 +18,9 @@ class LocalizationParameters:
     position_noise_per_metre: float = 0.003  # [m/sqrt(m)] what odometry does not know of: carpet that gives way
     position_noise_per_radian: float = 0.003  # [m/sqrt(rad)] turning in place wanders
     position_noise_per_second: float = 0.001  # [m/sqrt(s)] keeps the filter awake while standing
-    heading_noise_per_metre: float = math.radians(0.05)  # [rad/sqrt(m)]
-    heading_noise_per_radian: float = math.radians(0.1)  # [rad/sqrt(rad)]
-    heading_noise_per_second: float = math.radians(0.03)  # [rad/sqrt(s)] noise of the IMU's heading
+    heading_noise_per_metre: float = math.radians(0.06)  # [rad/sqrt(m)]
+    heading_noise_per_radian: float = math.radians(0.15)  # [rad/sqrt(rad)]
+    heading_noise_per_second: float = math.radians(0.04)  # [rad/sqrt(s)] noise of the IMU's heading
     drift_spread: float = 0.0005  # [rad/s] of the heading: bias of the IMU, twice that of a good one
     drift_time: float = 60.0  # [s] how long a drift lasts
     tilt_spread: float = math.radians(0.3)  # [rad] of the camera: IMU, bending of legs and neck while walking
