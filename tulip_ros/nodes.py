@@ -49,6 +49,7 @@ NODES: dict[str, NodeEntry] = {
         NodeEntry("strategy", "tulip_strategy.strategy_node"),
         NodeEntry("game_input", "tulip_strategy.game_input_node"),
         NodeEntry("user_input", "tulip_strategy.user_input_node"),
+        NodeEntry("perception", "tulip_sim.perception_node", playing=False),
         NodeEntry("recorder", "tulip_ros.recorder_node", playing=False),
     )
 }

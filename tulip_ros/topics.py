@@ -151,7 +151,12 @@ CAMERA_COMPRESSED = Topic(
 )
 CAMERA_INFO = Topic("camera/camera_info", CameraInfo, LATCHED, ("driver",), ("vision",), "lens of the head camera")
 JOINT_STATES = Topic(
-    "joint_states", JointState, CONTROL, ("driver",), ("motion", "head", "vision"), "14 joints: [rad], [rad/s], [N m]"
+    "joint_states",
+    JointState,
+    CONTROL,
+    ("driver",),
+    ("motion", "head", "vision", "perception"),
+    "14 joints: [rad], [rad/s], [N m]",
 )
 IMU = Topic("imu", Imu, CONTROL, ("driver",), ("motion",), "inertial unit in the trunk, in imu_link")
 FOOT_FORCES = Topic("foot_forces", FootForces, CONTROL, ("driver",), ("motion",), "four force cells a foot and the CoP")
@@ -159,10 +164,17 @@ LEG_COMMAND = Topic("legs/joint_command", JointCommand, CONTROL, ("motion",), ("
 HEAD_JOINT_COMMAND = Topic(
     "head/joint_command", JointCommand, CONTROL, ("head",), ("driver",), "to head_pan and head_tilt"
 )
-FEATURES = Topic("features", Features, STATE, ("vision",), ("worldmodel",), "features of one picture, two angles each")
+FEATURES = Topic(
+    "features", Features, STATE, ("vision", "perception"), ("worldmodel",), "features of one picture, two angles each"
+)
 VISION_PICTURE = Topic("vision/picture", Image, PICTURE, ("vision",), (), "picture with the features drawn in")
 ODOMETRY = Topic(
-    "odometry", Odometry, CONTROL, ("motion",), ("worldmodel", "vision"), "dead reckoning: base_link in odom"
+    "odometry",
+    Odometry,
+    CONTROL,
+    ("motion",),
+    ("worldmodel", "vision", "perception"),
+    "dead reckoning: base_link in odom",
 )
 MOTION_STATE = Topic("motion_state", MotionState, CONTROL, ("motion",), ("strategy",), "everything about the legs")
 WORLD_STATE = Topic("world_state", WorldState, STATE, ("worldmodel",), ("strategy",), "robot, ball and opponents")
@@ -178,7 +190,12 @@ DECISION = Topic("decision", Decision, STATE, ("strategy",), (), "what strategy 
 ROBOT_DESCRIPTION = Topic("robot_description", String, LATCHED, ("driver",), (), "URDF of the robot, for viewers")
 DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, EVENTS, ALL_NODES, (), "health of each node, once a second")
 GROUND_TRUTH = Topic(
-    "ground_truth", GroundTruth, CONTROL, ("driver",), (), "what really is; no component that plays may listen"
+    "ground_truth",
+    GroundTruth,
+    CONTROL,
+    ("driver",),
+    ("perception",),
+    "what really is; no component that plays may listen",
 )
 CLOCK = Topic("/clock", Clock, Quality(depth=1), ("driver",), ALL_NODES, "time of the simulation, 50 Hz")
 

@@ -1,8 +1,9 @@
-"""The head camera and vision of a lockstep, in the same process or beside it in one of its own.
+"""The head camera and vision of a lockstep, in the same process or beside it in one of its own, or neither.
 
 Rendering and seeing take as long as all the rest together. What a picture shows is needed only 48 ms of
 simulated time after its exposure, so a second process can work on it meanwhile. The order of results is
-fixed, and so the trial is the same bit for bit.
+fixed, and so the trial is the same bit for bit. For fast tests of behaviour, `TruthEyes` give features without
+pictures.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from numpy.typing import NDArray
 from tulip_description.field import load_field
 from tulip_description.robot import load_robot
 from tulip_sim.camera import CameraParameters, CameraRenderer
+from tulip_sim.perception import Glimpse, Perception, PerceptionParameters
+from tulip_sim.timing import FEATURE_DELAY_TICKS, TICK
 from tulip_sim.truth import Truth
 from tulip_vision.features import Features
 from tulip_vision.lens import head_camera_lens
@@ -44,8 +47,15 @@ class EyesParameters:
     seed: int
 
 
+LATENCY = FEATURE_DELAY_TICKS * TICK * 1_000_000  # [ns] of camera and vision
+
+
 class Eyes(Protocol):
     """Takes pictures and says what they show. One picture is worked on at a time: expose, look, collect."""
+
+    @property
+    def latency(self) -> int:
+        """Time from the exposure until the features may be used [ns]."""
 
     def expose(self, truth: Truth) -> None:
         """Take a picture of what is."""
@@ -53,8 +63,8 @@ class Eyes(Protocol):
     def look(self, stamp: int, camera_in_footprint: Array) -> None:
         """Begin to find features in the picture taken last, given its stamp [ns] and the (4, 4) camera pose."""
 
-    def collect(self) -> tuple[Picture, Features]:
-        """Return the picture and its features."""
+    def collect(self) -> tuple[Picture | None, Features]:
+        """Return the picture, if there is one, and its features."""
 
     def close(self) -> None:
         """Free what is held."""
@@ -62,6 +72,8 @@ class Eyes(Protocol):
 
 class OwnEyes:
     """Camera and vision in this process."""
+
+    latency = LATENCY
 
     def __init__(self, parameters: EyesParameters) -> None:
         """Make camera and vision."""
@@ -87,8 +99,43 @@ class OwnEyes:
         """Nothing is held."""
 
 
+class TruthEyes:
+    """Neither camera nor vision: features from the truth, as good as parameters say. For fast tests of behaviour."""
+
+    def __init__(self, parameters: EyesParameters, perception: PerceptionParameters) -> None:
+        """Make the perception; the camera's parameters count for how it is mounted."""
+        self._perception = Perception(
+            perception,
+            load_field(),
+            load_robot(),
+            head_camera_lens(),
+            parameters.camera,
+            parameters.vision.spread,
+        )
+        self.latency = round(perception.latency * 1e9)
+        self._rng = np.random.default_rng([parameters.seed, 1])
+        self._glimpses: tuple[Glimpse, ...] = ()
+
+    def expose(self, truth: Truth) -> None:
+        """Note what the camera sees."""
+        self._glimpses = self._perception.expose(truth, self._rng)
+
+    def look(self, stamp: int, camera_in_footprint: Array) -> None:
+        """Make features of it."""
+        self._features = self._perception.features(self._glimpses, stamp, camera_in_footprint, self._rng)
+
+    def collect(self) -> tuple[Picture | None, Features]:
+        """Return the features; there is no picture."""
+        return None, self._features
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
 class EyesBeside:
     """Camera and vision in a process of their own."""
+
+    latency = LATENCY
 
     def __init__(self, parameters: EyesParameters) -> None:
         """Start the process and wait until it is ready.

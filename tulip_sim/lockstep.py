@@ -7,6 +7,7 @@ answers, features arrive some ticks after their picture.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from tulip_description.camera_mount import load_mount
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.field import Field, load_field
+from tulip_description.planar import Pose2D
 from tulip_description.robot import Robot, load_robot
 from tulip_description.robot_io import JointCommand
 from tulip_motion.head import HeadMovement, HeadParameters
@@ -24,16 +26,18 @@ from tulip_motion.interface import HeadCommand, HeadMode, MotionState
 from tulip_motion.motion import Motion
 from tulip_motion.parameters import MotionParameters
 from tulip_sim.camera import CameraParameters
-from tulip_sim.eyes import Eyes, EyesBeside, EyesParameters, OwnEyes
+from tulip_sim.eyes import LATENCY, Eyes, EyesBeside, EyesParameters, OwnEyes, Picture, TruthEyes
 from tulip_sim.parameters import WorldParameters
+from tulip_sim.perception import PerceptionParameters
 from tulip_sim.referee import Outcome, Referee, RefereeParameters
 from tulip_sim.scenario import Scenario
-from tulip_sim.timing import CAMERA_TICKS, DECISION_TICKS, FEATURE_DELAY_TICKS, SLOW_TICKS, TICK
+from tulip_sim.timing import CAMERA_TICKS, DECISION_TICKS, SLOW_TICKS, TICK
 from tulip_sim.world import World
 from tulip_strategy.game_input import GameInput, GameInputParameters
 from tulip_strategy.interface import Decision, GameState, UserCommand, UserRequest
 from tulip_strategy.parameters import StrategyParameters
 from tulip_strategy.strategy import Strategy
+from tulip_vision.features import Features
 from tulip_vision.pipeline import VisionParameters
 from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParameters
 from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
@@ -44,7 +48,11 @@ Listener = Callable[[str, int, object], None]
 
 @dataclass(frozen=True)
 class Settings:
-    """Parameters of all cores."""
+    """Parameters of all cores.
+
+    With `perception` no pictures are rendered and no vision runs; features come from the truth instead, as good as it
+    says. For fast tests of behaviour only; None, the default, is the camera with real vision.
+    """
 
     world: WorldParameters = field(default_factory=WorldParameters)
     camera: CameraParameters = field(default_factory=CameraParameters)
@@ -55,6 +63,7 @@ class Settings:
     head: HeadParameters = field(default_factory=HeadParameters)
     strategy: StrategyParameters = field(default_factory=StrategyParameters)
     game_input: GameInputParameters = field(default_factory=GameInputParameters)
+    perception: PerceptionParameters | None = None
 
 
 class Lockstep:
@@ -67,6 +76,7 @@ class Lockstep:
         settings: Settings | None = None,
         listener: Listener | None = None,
         eyes_beside: bool = False,
+        belief: Pose2D | None = None,
     ) -> None:
         """Wire the cores.
 
@@ -78,6 +88,7 @@ class Lockstep:
             listener: Told of every message that the graph would carry.
             eyes_beside: Let camera and vision work in a process of their own: faster where a core is free.
                 Call `close` at the end then. The trial is the same.
+            belief: Where the robot is told to stand, if that is not where it stands.
         """
         settings = settings or Settings()
         robot_field: Field = load_field()
@@ -86,9 +97,12 @@ class Lockstep:
         self.world = World(scenario, settings.world, seed, robot_field, robot)
         self.referee = Referee(settings.referee, robot_field)
         eyes = EyesParameters(settings.camera, settings.vision, seed)
-        self._eyes: Eyes = EyesBeside(eyes) if eyes_beside else OwnEyes(eyes)
+        if settings.perception is not None:
+            self._eyes: Eyes = TruthEyes(eyes, settings.perception)
+        else:
+            self._eyes = EyesBeside(eyes) if eyes_beside else OwnEyes(eyes)
         self._poses = PoseBuffer(PoseBufferParameters(), partial(camera_in_footprint, robot, mount=load_mount()))
-        self.world_model = WorldModel(settings.worldmodel, robot_field, scenario.robot)
+        self.world_model = WorldModel(settings.worldmodel, robot_field, belief or scenario.robot)
         self.motion = Motion(settings.motion, robot)
         self.head = HeadMovement(settings.head, robot)
         self.strategy = Strategy(settings.strategy, robot_field)
@@ -98,6 +112,7 @@ class Lockstep:
         self._pending: list[JointCommand] = []
         self._exposed: int | None = None  # stamp of the picture worked on [ns]
         self._looking = False
+        self._seen: deque[tuple[Picture | None, Features]] = deque()  # not used before their time
         self._tick = 0
         self.doing = ""
         """Active path of the behaviour tree."""
@@ -168,20 +183,28 @@ class Lockstep:
 
     def _see(self, tick: int) -> None:
         """Take a picture, look at it as soon as its camera pose is known, and use what was seen when it is due."""
+        now = self.stamp
         if tick == 0:
-            self._exposed, self._looking = self.stamp, False
+            self._exposed, self._looking = now, False
             self._eyes.expose(self.world.truth())
         if self._exposed is not None and not self._looking:
             pose = self._poses.camera_in_footprint(self._exposed)
             if not isinstance(pose, MissingPose):
-                self._eyes.look(self._exposed, pose)
-                self._looking = True
-        if self._exposed is not None and self._looking and tick == FEATURE_DELAY_TICKS:
-            picture, features = self._eyes.collect()
-            self.world_model.add_features(features)
-            self._tell("camera/image_raw", self._exposed, picture)
-            self._tell("features", self._exposed, features)
+                if pose[2, 3] > 0.0:
+                    self._eyes.look(self._exposed, pose)
+                    self._looking = True
+                else:
+                    self._exposed = None  # a fallen robot's belief puts the camera below the ground: nothing to see
+        # Vision beside this process has until then to work.
+        if self._exposed is not None and self._looking and now - self._exposed >= min(LATENCY, self._eyes.latency):
+            self._seen.append(self._eyes.collect())
             self._exposed = None
+        while self._seen and now - self._seen[0][1].stamp >= self._eyes.latency:
+            picture, features = self._seen.popleft()
+            self.world_model.add_features(features)
+            if picture is not None:
+                self._tell("camera/image_raw", features.stamp, picture)
+            self._tell("features", features.stamp, features)
 
     def _decide(self, stamp: int) -> None:
         """Let strategy see the world and command the legs and the head."""

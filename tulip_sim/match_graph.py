@@ -86,8 +86,11 @@ def trial_plan(
     parameter_files: Sequence[Path] = (),
     values: Mapping[str, Mapping[str, Any]] | None = None,
     referee_port: int = REFEREE_PORT,
+    perception: bool = False,
 ) -> tuple[Start, ...]:
     """Return the nodes of a trial: simulator, robot, and recorder if wanted. Arguments as for `play_graph`.
+
+    With `perception` node perception stands in for vision, without pictures: for fast tests of behaviour only.
 
     Raises:
         BadInputError: for an unknown scenario, or files that cannot be used.
@@ -103,6 +106,10 @@ def trial_plan(
         "user_input": {"autostart": True},
     }
     nodes = list(NODES)
+    if perception:
+        nodes[nodes.index("vision")] = "perception"
+        given["driver"].update(wait_for=list(nodes), camera=False)
+        given["perception"] = {"seed": seed}
     if record is not None:
         nodes.append("recorder")
         given["recorder"] = {"path": str(record.absolute()), "exclude": list(UNRECORDED)}

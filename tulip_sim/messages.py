@@ -7,13 +7,14 @@ import math
 
 import cv2
 import numpy as np
-from geometry_msgs.msg import Pose, Twist
+from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, CompressedImage
 
 from tulip_description import frames
+from tulip_description.planar import Pose2D
 from tulip_msgs.msg import GroundTruth
-from tulip_ros.time import header
+from tulip_ros.time import header, stamp_of
 from tulip_sim.referee import Referee
 from tulip_sim.truth import Truth
 from tulip_vision.lens import Lens
@@ -65,6 +66,46 @@ def truth_to_message(truth: Truth, referee: Referee) -> GroundTruth:
             np.array([keeper.x, keeper.y, 0.0]), np.array([0.0, 0.0, math.sin(half), math.cos(half)])
         )
     return message
+
+
+def truth_from_message(message: GroundTruth, poles: bool) -> Truth:
+    """Return what really is, as far as the message tells: joint velocities are zero, no path and no touches are known.
+
+    Args:
+        message: From `truth_to_message`.
+        poles: Whether the landmark poles stand.
+    """
+    keeper = None
+    if message.keeper_present:
+        turn = message.keeper.orientation
+        keeper = Pose2D(message.keeper.position.x, message.keeper.position.y, 2.0 * math.atan2(turn.z, turn.w))
+    return Truth(
+        stamp=stamp_of(message),
+        base_position=_vector(message.robot.position),
+        base_orientation=_quaternion(message.robot.orientation),
+        base_linear_velocity=_vector(message.robot_twist.linear),
+        base_angular_velocity=_vector(message.robot_twist.angular),
+        joint_positions=np.array(message.joint_positions, dtype=np.float64),
+        joint_velocities=np.zeros(len(message.joint_positions)),
+        ball_position=_vector(message.ball.position),
+        ball_orientation=_quaternion(message.ball.orientation),
+        ball_linear_velocity=_vector(message.ball_twist.linear),
+        ball_angular_velocity=_vector(message.ball_twist.angular),
+        keeper=keeper,
+        keeper_path=(),
+        foot_touches=(0, 0),
+        body_touches=0,
+        keeper_touches=0,
+        poles=poles,
+    )
+
+
+def _vector(message: Point | Vector3) -> Array:
+    return np.array([message.x, message.y, message.z])
+
+
+def _quaternion(message: Quaternion) -> Array:
+    return np.array([message.x, message.y, message.z, message.w])
 
 
 def _pose(position: Array, orientation: Array) -> Pose:

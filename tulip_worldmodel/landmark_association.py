@@ -54,11 +54,26 @@ class Choice:
         observation: Index of the observation.
         candidate: The chosen candidate, or None when the feature is rejected.
         reason: Why it was rejected, or "".
+        ambiguous: Rejected only because it may be one of several.
     """
 
     observation: int
     candidate: int | None
     reason: str = ""
+    ambiguous: bool = False
+
+
+@dataclass(frozen=True)
+class Association:
+    """What was decided for a picture.
+
+    Attributes:
+        choices: One an observation, in their order.
+        log_likelihood: Of all observations, with the best choices.
+    """
+
+    choices: tuple[Choice, ...]
+    log_likelihood: float
 
 
 @dataclass(frozen=True)
@@ -102,7 +117,7 @@ def associate(
     clutter: Sequence[float],
     gate_probability: float,
     odds: float,
-) -> tuple[Choice, ...]:
+) -> Association:
     """Decide for each observation which candidate it shows.
 
     Args:
@@ -113,17 +128,16 @@ def associate(
         clutter: For each, the density of false ones in its measurement space.
         gate_probability: Share of true observations that the chi-square gate lets pass.
         odds: How much more likely than any other choice the best one must be.
-
-    Returns:
-        One choice per observation, in their order.
     """
     rejected: dict[int, str] = {}
+    outside = 0.0  # cost of the features without any candidate
     usable: list[_Linearized] = []
     for index, observation in enumerate(observations):
         possible = observation.possible(state)
         near = _inside_gate(state, covariance, observation, possible, gate_probability) if len(possible) else None
         if near is None:
             rejected[index] = "no landmark inside the gate"
+            outside += -2.0 * math.log(false_rates[index] * clutter[index])
             continue
         candidates, innovations, jacobians, noises = near
         dimension = innovations.shape[1]
@@ -148,7 +162,8 @@ def associate(
         children.sort(key=lambda child: child.cost)
         limit = children[0].cost + 2.0 * gap  # later features may turn the order, not by more than this in practice
         hypotheses = [_grown(child, item) for child in children[:WIDTH] if child.cost <= limit]
-    return _verdicts(len(observations), usable, hypotheses, rejected, gap)
+    choices = _verdicts(len(observations), usable, hypotheses, rejected, gap)
+    return Association(choices, -0.5 * (hypotheses[0].cost + outside))
 
 
 def _inside_gate(
@@ -200,6 +215,7 @@ def _verdicts(
 ) -> tuple[Choice, ...]:
     best = hypotheses[0]
     chosen: dict[int, int] = {}
+    ambiguous: set[int] = set()
     for position, item in enumerate(usable):
         choice = best.choices[position]
         others = [other.cost for other in hypotheses[1:] if other.choices[position] != choice]
@@ -207,9 +223,10 @@ def _verdicts(
             rejected[item.observation] = "more likely false than any landmark inside the gate"
         elif others and min(others) - best.cost < gap:
             rejected[item.observation] = "ambiguous: another explanation is about as likely"
+            ambiguous.add(item.observation)
         else:
             chosen[item.observation] = choice
     return tuple(
-        Choice(index, chosen[index]) if index in chosen else Choice(index, None, rejected[index])
+        Choice(index, chosen[index]) if index in chosen else Choice(index, None, rejected[index], index in ambiguous)
         for index in range(count)
     )

@@ -7,14 +7,20 @@ from bisect import bisect_right
 from collections import deque
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_description.quaternion import pose_on_ground
 from tulip_motion.interface import Odometry
+
+Array = NDArray[np.float64]
 
 TURN_PORTION = 0.1
 """[rad] Turning is counted when it has grown to this: the trunk's swinging at each step is no turning."""
 PATH_PORTION = 0.15
 """[m] Likewise for the path: the trunk sways to both sides at each step."""
+PLANE = np.ix_((0, 1, 5), (0, 1, 5))  # x, y and yaw among the six of a pose
 
 
 @dataclass(frozen=True)
@@ -26,12 +32,14 @@ class PathPoint:
         pose: base_footprint in odom.
         distance: Path length since the start [m], in portions of `PATH_PORTION`.
         turned: Sum of all turning, left and right, since the start [rad], in portions of `TURN_PORTION`.
+        covariance: (3, 3) of x, y [m] and yaw [rad] in odom as odometry says, or None.
     """
 
     stamp: int
     pose: Pose2D
     distance: float = 0.0
     turned: float = 0.0
+    covariance: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -43,12 +51,14 @@ class Increment:
         distance: Path length between them [m].
         turned: Turning between them [rad], >= 0.
         duration: [s].
+        slip: (2, 2) covariance of x, y [m^2] that odometry itself says the movement added, or None.
     """
 
     pose: Pose2D
     distance: float
     turned: float
     duration: float
+    slip: Array | None = None
 
 
 def increment(earlier: PathPoint, later: PathPoint) -> Increment:
@@ -58,7 +68,24 @@ def increment(earlier: PathPoint, later: PathPoint) -> Increment:
         max(0.0, later.distance - earlier.distance),
         max(0.0, later.turned - earlier.turned),
         (later.stamp - earlier.stamp) * 1e-9,
+        slip_between(earlier, later),
     )
+
+
+def slip_between(earlier: PathPoint, later: PathPoint) -> Array | None:
+    """Return the (2, 2) position covariance that odometry added between two moments, in axes of the earlier one.
+
+    Odometry tells the covariance since its start: P2 = F P1 F^T + Q, where F carries the heading's error along the way.
+    Q is what is asked for; what of it is negative (parts of P that do not add up, as the sway of the trunk) is cut off.
+    """
+    if earlier.covariance is None or later.covariance is None:
+        return None
+    carried = np.eye(3)
+    carried[:2, 2] = earlier.pose.y - later.pose.y, later.pose.x - earlier.pose.x
+    added = (later.covariance - carried @ earlier.covariance @ carried.T)[:2, :2]
+    turn = earlier.pose.rotation()
+    values, vectors = np.linalg.eigh(turn.T @ added @ turn)
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
 
 
 class OdometryHistory:
@@ -93,7 +120,8 @@ class OdometryHistory:
             if turn >= TURN_PORTION:
                 turned += turn
                 self._counted = Pose2D(self._counted.x, self._counted.y, pose.yaw)
-        self._points.append(PathPoint(odometry.stamp, pose, distance, turned))
+        covariance = odometry.covariance[PLANE] if odometry.covariance.any() else None
+        self._points.append(PathPoint(odometry.stamp, pose, distance, turned, covariance))
         while len(self._points) > 2 and self._points[1].stamp < odometry.stamp - self._duration:
             self._points.popleft()
         return True
@@ -125,4 +153,7 @@ class OdometryHistory:
         )
         distance = before.distance + part * (after.distance - before.distance)
         turned = before.turned + part * (after.turned - before.turned)
-        return PathPoint(stamp, pose, distance, turned)
+        covariance = None
+        if before.covariance is not None and after.covariance is not None:
+            covariance = before.covariance + part * (after.covariance - before.covariance)
+        return PathPoint(stamp, pose, distance, turned, covariance)

@@ -16,7 +16,8 @@ from tulip_description.planar import Pose2D
 from tulip_motion.interface import Odometry
 from tulip_vision.features import Features
 from tulip_worldmodel.ball_filter import BallFilter, BallParameters
-from tulip_worldmodel.localization import Localization, LocalizationParameters
+from tulip_worldmodel.localization import Localization
+from tulip_worldmodel.localization_parameters import LocalizationParameters
 from tulip_worldmodel.moving_point import PointEstimate
 from tulip_worldmodel.odometry_history import OdometryHistory, PathPoint, increment
 from tulip_worldmodel.opponent_filter import OpponentFilter, OpponentParameters
@@ -67,6 +68,11 @@ class WorldModel:
         self._history = OdometryHistory(2.0 * parameters.greatest_delay)
         self._now: PathPoint | None = None  # where and when all filters stand
         self._last_picture: int | None = None  # stamp [ns]
+
+    @property
+    def localization(self) -> Localization:
+        """What knows where the robot is, for a look at its hypotheses."""
+        return self._localization
 
     def add_odometry(self, odometry: Odometry) -> None:
         """Take a reading of dead reckoning; one that is not newer than the newest is ignored."""

@@ -17,6 +17,8 @@ from tulip_description.field import CrossingKind, Field, load_field
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.interface import Odometry
 from tulip_vision.features import Feature, FeatureClass, Features
+from tulip_vision.view import SpreadParameters
+from tulip_worldmodel.localization_parameters import LocalizationParameters
 
 Array = NDArray[np.float64]
 CAMERA = np.array([0.05, 0.0, 1.15])
@@ -47,6 +49,22 @@ class Errors:
     vision: bool = True
 
 
+ROUGH = LocalizationParameters(
+    position_noise_per_metre=0.10,
+    position_noise_per_radian=0.05,
+    position_noise_per_second=0.01,
+    heading_noise_per_metre=math.radians(1.0),
+    heading_noise_per_radian=math.radians(2.0),
+    heading_noise_per_second=math.radians(0.3),
+    drift_spread=0.02,
+    tilt_spread=math.radians(0.6),
+    extra_azimuth_spread=math.radians(0.4),
+    extra_elevation_spread=math.radians(0.3),
+    landmark_spread=0.03,
+)
+"""What fits the errors of this walk: feet that slip, an IMU that drifts, play in the neck, lines painted by hand."""
+
+
 @dataclass(frozen=True)
 class Moment:
     """What the world model gets at one tick, with the truth beside it."""
@@ -57,6 +75,12 @@ class Moment:
     features: Features | None
     ball: Array | None
     ball_velocity: Array | None
+
+
+def claimed_spreads(own: float) -> tuple[float, float]:
+    """Return what vision claims for azimuth and elevation [rad]: a feature's own error and the camera pose's."""
+    vision = SpreadParameters()
+    return math.hypot(own, vision.pose_azimuth), math.hypot(own, vision.pose_elevation)
 
 
 WAYPOINTS = ((1.5, 1.0), (3.2, -0.8), (0.5, -2.0), (-2.0, -1.0), (-1.0, 1.8), (2.5, 0.5), (-3.0, 1.5))
@@ -206,9 +230,11 @@ class Simulation:
 
     def feature(self, kind: FeatureClass, azimuth: float, elevation: float) -> Feature:
         """Return a feature with noise."""
-        spread = self.errors.angle_spread
-        noise = self.rng.normal(size=2) * spread
-        return Feature(kind, wrap_angle(azimuth + noise[0]), elevation + noise[1], spread, spread, 0.9)
+        noise = self.rng.normal(size=2) * self.errors.angle_spread
+        spreads = (self.errors.angle_spread,) * 2
+        if kind not in (FeatureClass.BALL, FeatureClass.OPPONENT):
+            spreads = claimed_spreads(self.errors.angle_spread)
+        return Feature(kind, wrap_angle(azimuth + noise[0]), elevation + noise[1], *spreads, 0.9)
 
     def lines(self, pose: Pose2D, tilt: Array, view: Array) -> list[Feature]:
         """Return the parts of lines inside the picture, cut to 6 m range."""
