@@ -19,11 +19,11 @@ from rich.markdown import Markdown
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
-from tulip_sim.bench import clik, control, ilc, kick, odometry, push, stress, trial, walk
+from tulip_sim.bench import clik, control, head, ilc, kick, odometry, push, stress, trial, walk
 from tulip_sim.bench.runner import Row, run, save, write_results
 
 BENCHES = {
-    module.BENCH.name: module.BENCH for module in (trial, walk, push, kick, odometry, control, ilc, clik, stress)
+    module.BENCH.name: module.BENCH for module in (trial, walk, push, kick, odometry, control, ilc, clik, stress, head)
 }
 DOCS = _environment.ROOT / "docs"
 

@@ -4,8 +4,8 @@ Each gaze is worth the uncertainty that it is expected to remove per time, way t
 
     value = (trace(W_pose (P - P')) + (trace(B) - trace(B')) / w_ball^2) / (travel + look)
 
-with the covariances of pose (P) and ball (B) without the look and after it (P', B'; see gaze_landmarks.py), and W_pose = diag(w_xy, w_xy, w_yaw)^-2: each uncertainty is measured by the one that play can do
-with. The gaze of greatest value is held until it has been looked along, then the choice is made anew. While the ball is
+with the covariances of pose (P) and ball (B) without the look and after it (P', B'; see gaze_landmarks.py), and
+W_pose = diag(w_xy, w_xy, w_yaw)^-2: each uncertainty is measured by the one that play can do with. The gaze of greatest value is held until it has been looked along, then the choice is made anew. While the ball is
 looked at, the pose becomes less sure, and looking at landmarks more valuable; and the other way round.
 """
 
@@ -57,12 +57,13 @@ class GazeParameters:
     gaze_crossing_reach: float = 5.0  # [m] lines are thin
     gaze_mark_reach: float = 3.5  # [m]
     gaze_ball_reach: float = 8.0  # [m]
-    gaze_position_wanted: float = 0.15  # [m] what play can do with, of each axis: half a gap beside the keeper at 2 m
-    gaze_heading_wanted: float = math.radians(4.0)  # [rad] same, as the direction of a kick
+    gaze_position_wanted: float = 0.10  # [m] what play can do with, of each axis: half a gap beside the keeper at 2 m
+    gaze_heading_wanted: float = math.radians(3.0)  # [rad] same, as the direction of a kick
     gaze_ball_wanted: float = 0.04  # [m] of a ball near the feet: the kick's window
     gaze_ball_wanted_share: float = 0.08  # of the ball's range: how well a way to it has to be aimed
     gaze_ball_doubt: float = 0.12  # [m/s] an unseen ball may have been touched: filters do not expect that
-    gaze_ball_doubt_share: float = 0.2  # of its speed: a rolling ball may be stopped or turned aside
+    gaze_ball_doubt_share: float = 0.4  # of its speed: a rolling ball may be stopped or turned aside
+    gaze_rolling: float = 0.4  # [m/s] a faster ball is kept in the picture's middle, where the head can lead it
     gaze_least_value: float = 1.0  # [1/s] a look that takes the ball out of the picture has to be worth that much more
     gaze_turn_cost: float = 0.3  # [1/s/rad] the same for each way that the head goes: pictures blur
 
@@ -177,8 +178,10 @@ class GazePlanner:
 
     def gazes(self, known: GazeInput) -> Gazes:
         """Return the gazes to choose from."""
-        beside = np.clip(self._towards_ball(known) + self._beside_ball, self._geometry.lower, self._geometry.upper)
-        return Gazes(np.vstack((beside, self._grid)), self._beside_ball)
+        rolls = float(np.hypot(*known.ball_velocity)) > self._parameters.gaze_rolling
+        relative = self._beside_ball[:1] if rolls else self._beside_ball
+        beside = np.clip(self._towards_ball(known) + relative, self._geometry.lower, self._geometry.upper)
+        return Gazes(np.vstack((beside, self._grid)), relative)
 
     def values(self, known: GazeInput, angles: Array, head: Array) -> tuple[Array, Array]:
         """Return what gazes are worth.

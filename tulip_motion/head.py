@@ -34,7 +34,7 @@ class HeadParameters:
     limit_margin: float = 0.02  # [rad] kept from the joints' stops
     search_pan: float = 2.38  # [rad] to both sides: the joint's range but for limit_margin
     search_tilt_far: float = 0.38  # [rad] down: a picture 59 deg high reaches from 1 m to the horizon
-    search_tilt_near: float = 0.95  # [rad] down: from the own feet to 2.4 m
+    search_tilt_near: float = 1.15  # [rad] down: from the ball at the toes to 1.3 m, where the other row has begun
     near_distance: float = 1.2  # [m] a target lost nearer than this is searched near first
     arrived: float = 0.03  # [rad] from the end of a sweep, where the next one begins
     lead: float = 0.03  # [s] the joints are behind their commands: a tick of 20 ms, and the driver's

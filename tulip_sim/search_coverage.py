@@ -21,7 +21,6 @@ from tulip_sim.timing import CAMERA_TICKS, SLOW_TICKS, TICK
 from tulip_vision.lens import Lens
 
 Array = NDArray[np.float64]
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -33,12 +32,16 @@ class CoverageParameters:
         least_diameter: Of the ball in the picture [px].
         least_pictures: In so many pictures: the world model takes a ball for real with the third sighting.
         sharp_speed: Pictures taken while the head turns faster than this do not count [rad/s].
+        lowered: How much lower than in the standing posture a walking robot carries its head [m].
+        lean: How far its trunk leans forward [rad].
     """
 
     ball_radius: float
     least_diameter: float = 4.0
     least_pictures: int = 3
     sharp_speed: float = 1.6
+    lowered: float = 0.0
+    lean: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ def search_coverage(
 
     Args:
         head: Of head movement, whose search pattern is run.
-        robot: A robot with a head; it stands upright at the height of its standing posture.
+        robot: A robot with a head; its head is as high as in its standing posture, less `lowered`.
         lens: Of the head camera.
         directions: (d,) of places to ask for [rad].
         ranges: (r,) of these [m].
@@ -92,7 +95,8 @@ def search_coverage(
         ],
         axis=-1,
     ).reshape(-1, 3)
-    height = standing_posture(robot).base_height
+    height = standing_posture(robot).base_height - parameters.lowered
+    attitude = (0.0, math.sin(parameters.lean / 2.0), 0.0, math.cos(parameters.lean / 2.0))
     movement = HeadMovement(head, robot)
     command = HeadCommand(0, HeadMode.SEARCH)
     angles, velocity = np.array(start), np.zeros(2)
@@ -106,7 +110,7 @@ def search_coverage(
         if tick % CAMERA_TICKS or float(np.abs(velocity).max()) > parameters.sharp_speed:
             continue
         pan, tilt = (angles + velocity * (tick % SLOW_TICKS) * TICK * 1e-3).tolist()
-        camera = camera_in_footprint(robot, height, UPRIGHT, pan, tilt)
+        camera = camera_in_footprint(robot, height, attitude, pan, tilt)
         turned = turning * seconds
         c, s = math.cos(turned), math.sin(turned)
         inside = _shown(places @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), camera, lens, parameters)

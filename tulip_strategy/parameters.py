@@ -92,7 +92,7 @@ class StrategyParameters(GazeParameters):
     ball_confidence: float = 0.25  # below this it may be a false sighting
     look_back_time: float = 1.5  # [s] look where it was
     look_back_reach: float = 1.2  # [rad] where it was farther to the side, the body turns there too
-    sweep_time: float = 7.0  # [s] one whole sweep of the head, far and near
+    sweep_time: float = 9.0  # [s] one whole sweep of the head, far and near, lasts 8.6 s
     search_turn_speed: float = 0.5  # [rad/s] slow enough for a picture every 2 deg
     search_walk_time: float = 6.0  # [s] towards the field's middle after a whole turn without a ball
 

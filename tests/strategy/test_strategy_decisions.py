@@ -228,15 +228,18 @@ def test_no_kick_while_motion_control_still_walks() -> None:
     assert all(decision.kick is None for decision in decisions)
 
 
-def test_the_ball_is_tracked_with_glances_at_landmarks_in_front() -> None:
-    player = Player()
-    decisions = player.ticks(3.0 * PARAMETERS.glance_period, ball_at(1.5, 0.3), MotionMode.WALK)
+def test_a_robot_unsure_of_its_place_glances_at_landmarks_while_it_tracks_the_ball() -> None:
+    decisions = Player().ticks(3.0, ball_at(1.5, 0.3), MotionMode.WALK)  # 0.1 m and 6 deg: unsure
     assert {decision.head.mode for decision in decisions} == {HeadMode.TRACK}
-    glances = {decision.head.glance for decision in decisions}
-    assert None not in glances
-    goal = ROBOT.inverse().transform((FIELD.opponent_goal.x, 0.0))
-    assert any(glance is not None and glance[:2] == pytest.approx(goal) for glance in glances)
-    assert len(glances) == 2
+    assert any(decision.head.glance is not None for decision in decisions)
+
+
+def test_the_last_steps_before_a_kick_keep_the_ball_in_view() -> None:
+    player = Player()
+    x, y = kick_place(Side.RIGHT)
+    decisions = player.ticks(1.0, (x + 0.05, y - 0.06), MotionMode.WALK)
+    assert all(decision.head.glance is None for decision in decisions)
+    assert {decision.head.mode for decision in decisions} == {HeadMode.LOOK_AT}
 
 
 def test_velocities_keep_the_limits_and_change_no_faster_than_allowed() -> None:

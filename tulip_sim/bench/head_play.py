@@ -133,9 +133,7 @@ class HeadPlay:
         self.pose = self.pose @ Pose2D(forward, left, turn)
         walking = forward != 0.0 or left != 0.0 or turn != 0.0
         drift = self._gyro_drift * SECONDS if walking else 0.0
-        self._odom = self._odom @ Pose2D(
-            forward * self._scale, left * self._scale, turn * self._turn_scale + drift
-        )
+        self._odom = self._odom @ Pose2D(forward * self._scale, left * self._scale, turn * self._turn_scale + drift)
         self._distance += math.hypot(forward, left)
         speed = float(np.hypot(*self.ball_velocity))
         if speed > 0.0:
