@@ -5,8 +5,9 @@ Each gaze is worth the uncertainty that it is expected to remove per time, way t
     value = (trace(W_pose (P - P')) + (trace(B) - trace(B')) / w_ball^2) / (travel + look)
 
 with the covariances of pose (P) and ball (B) without the look and after it (P', B'; see gaze_landmarks.py), and
-W_pose = diag(w_xy, w_xy, w_yaw)^-2: each uncertainty is measured by the one that play can do with. The gaze of greatest value is held until it has been looked along, then the choice is made anew. While the ball is
-looked at, the pose becomes less sure, and looking at landmarks more valuable; and the other way round.
+W_pose = diag(w_xy, w_xy, w_yaw)^-2: each uncertainty is measured by the one that play can do with. The gaze of greatest
+value is held until it has been looked along, then the choice is made anew. While the ball is looked at, the pose
+becomes less sure, and looking at landmarks more valuable; and the other way round.
 """
 
 from __future__ import annotations

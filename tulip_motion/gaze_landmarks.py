@@ -112,7 +112,7 @@ def chance_in_picture(gazes: Array, angles: Array, spreads: Array, sight: Sight)
     Args:
         gazes: (g, 2) pan and tilt (positive looks down) [rad].
         angles: (n, 2), or (g, n, 2) one set a gaze: azimuth and elevation of the points [rad].
-        spreads: Of the same shape, standard deviations of these, from what is not known of the robot and of the points [rad].
+        spreads: Of the same shape, standard deviations of these: what is not known of robot and points [rad].
         sight: Of the camera.
 
     Returns:
@@ -157,7 +157,10 @@ def pose_after_look(
     ranges = np.hypot(*(landmarks.places - (pose.x, pose.y)).T)
     spreads = np.sqrt(np.einsum("nij,jk,nik->ni", jacobian[:, :, :3], covariance, jacobian[:, :, :3]))
     fade = np.clip(5.0 * (1.0 - ranges / landmarks.reaches), 0.0, 1.0)  # found less and less on the last fifth
-    chance = chance_in_picture(gazes, angles, spreads, sight) * (sight.found * fade)
+    # The chance of information is worth less than the same share of it for sure: what is more likely outside the
+    # picture than inside counts for nothing.
+    inside = np.maximum(0.0, 2.0 * chance_in_picture(gazes, angles, spreads, sight) - 1.0)
+    chance = inside * (sight.found * fade)
     ground = np.maximum(ranges, 0.1)
     height = float(eye[2])
     noise = np.column_stack(

@@ -20,7 +20,8 @@ class HeadTrajectory:
         """Begin at rest at zero.
 
         Args:
-            lower, upper: (2,) limits of the joints [rad].
+            lower: (2,) limits of the joints [rad].
+            upper: Likewise.
             acceleration: Largest [rad/s^2].
         """
         self._lower, self._upper = lower, upper
@@ -55,7 +56,7 @@ class HeadTrajectory:
         a = self._acceleration
         inside = np.clip(goal, self._lower, self._upper)
         follow = np.where(inside == goal, goal_velocity, 0.0)
-        distance = inside - self.position
+        distance = inside - follow * duration - self.position  # to where it was: both move on by the step
         wanted = follow + np.sign(distance) * self._stoppable(np.abs(distance), duration)
         wanted = np.clip(wanted, -speed, speed)
         wanted = np.clip(

@@ -1,4 +1,4 @@
-"""What the gaze planner is measured against: a glance every 3 s, at the goal attacked and the nearest landmark in turns."""
+"""What the gaze planner is measured against: every 3 s a glance, at the goal attacked or the nearest landmark."""
 
 from __future__ import annotations
 

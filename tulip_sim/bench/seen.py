@@ -84,8 +84,7 @@ class Seen:
         edge = self._p.edge
         with np.errstate(invalid="ignore"):
             inside = (pixels >= edge) & (pixels <= (self._lens.width - 1 - edge, self._lens.height - 1 - edge))
-        both: NDArray[np.bool_] = inside.all(axis=1)
-        return both
+        return np.asarray(inside.all(axis=1))
 
     def ball_diameter(self, ball: Array, head: Array) -> float:
         """Return how large a ball (3,) of base_footprint [m] is in the picture [px]."""
