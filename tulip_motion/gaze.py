@@ -58,14 +58,14 @@ class GazeParameters:
     gaze_crossing_reach: float = 5.0  # [m] lines are thin
     gaze_mark_reach: float = 3.5  # [m]
     gaze_ball_reach: float = 8.0  # [m]
-    gaze_position_wanted: float = 0.10  # [m] what play can do with, of each axis: half a gap beside the keeper at 2 m
-    gaze_heading_wanted: float = math.radians(3.0)  # [rad] same, as the direction of a kick
+    gaze_position_wanted: float = 0.05  # [m] of each axis: half of what play can do with, so that glances come in time
+    gaze_heading_wanted: float = math.radians(1.5)  # [rad] same, as the direction of a kick
     gaze_ball_wanted: float = 0.04  # [m] of a ball near the feet: the kick's window
     gaze_ball_wanted_share: float = 0.08  # of the ball's range: how well a way to it has to be aimed
-    gaze_ball_doubt: float = 0.12  # [m/s] an unseen ball may have been touched: filters do not expect that
+    gaze_ball_doubt: float = 0.08  # [m/s] an unseen ball may have been touched: filters do not expect that
     gaze_ball_doubt_share: float = 0.4  # of its speed: a rolling ball may be stopped or turned aside
     gaze_rolling: float = 0.4  # [m/s] a faster ball is kept in the picture's middle, where the head can lead it
-    gaze_least_value: float = 1.0  # [1/s] a look that takes the ball out of the picture has to be worth that much more
+    gaze_least_value: float = 0.5  # [1/s] a look that takes the ball out of the picture has to be worth that much more
     gaze_turn_cost: float = 0.3  # [1/s/rad] the same for each way that the head goes: pictures blur
 
     def __post_init__(self) -> None:

@@ -32,6 +32,7 @@ SIGHT = Sight(
 LANDMARKS = Landmarks(FIELD, 8.0, 7.0, 5.0, 3.5)
 PERIOD = 20_000_000  # [ns]
 START = Pose2D(1.0, 0.5, 0.0)
+SURE, UNSURE = (0.01, 0.005), (0.3, 0.15)  # [m], [rad]
 OUTWARDS = Pose2D(2.25, 1.6, math.pi / 2.0)  # at the side line, where a ball ahead has no landmark beside it
 
 
@@ -173,13 +174,17 @@ def test_a_ball_not_seen_for_long_draws_the_gaze_back() -> None:
 
 
 def test_a_ball_at_the_feet_keeps_most_of_the_time() -> None:
-    ball, age = (0.4, 0.1), 0.0
+    ball, age, variance = (0.4, 0.1), 0.0, 0.1**2
     planner = GazePlanner(PARAMETERS, FIELD, ROBOT)
     points = []
     for tick in range(500):
-        points.append(planner.plan(known(0.1, 0.05, ball, 0.01, age, stamp=10**9 + tick * PERIOD)))
-        age = 0.0 if away(points[-1:], ball) == 0.0 else age + 0.02
-    assert away(points, ball) < 0.5
+        spread = math.sqrt(variance)
+        points.append(planner.plan(known(spread, 0.5 * spread, ball, 0.01, age, stamp=10**9 + tick * PERIOD)))
+        looks_away = away(points[-1:], ball) > 0.0
+        age = age + 0.02 if looks_away else 0.0
+        # As in play: landmarks make the pose sure, walking makes it less sure again.
+        variance = 0.03**2 if age > 0.5 else variance + 0.05**2 * 0.02
+    assert 0.0 < away(points, ball) < 0.5
 
 
 def test_a_rolling_ball_is_never_looked_past() -> None:
@@ -193,7 +198,9 @@ def test_a_look_is_held_until_the_head_has_been_there() -> None:
     planner = GazePlanner(PARAMETERS, FIELD.without_poles(), ROBOT)
     points = [
         planner.plan(
-            known(*((0.01, 0.005) if tick // 7 % 2 else (0.3, 0.15)), pose=OUTWARDS, stamp=10**9 + tick * PERIOD)
+            known(*UNSURE, pose=OUTWARDS, stamp=10**9 + tick * PERIOD)
+            if tick // 7 % 2
+            else known(*SURE, age=1.0, pose=OUTWARDS, stamp=10**9 + tick * PERIOD)
         )
         for tick in range(300)
     ]

@@ -274,8 +274,8 @@ def summarize(rows: list[Row]) -> list[str]:
     lines = [
         "World model, gaze planner, strategy's search and head movement as they play, in the timing of lockstep."
         " Simulated without dynamics or pictures: the body slides as told with dead reckoning that errs by some"
-        " percent, and what vision would find comes from the truth through the real lens, with noise, misses (also of a fast"
-        " head), a camera that sways, and 48 ms of delay; localization gets no lines.",
+        " percent, and what vision would find comes from the truth through the real lens, with noise, misses (also of"
+        " a fast head), a camera that sways, and 48 ms of delay; localization gets no lines.",
         "",
         *_coverage_lines([row for row in rows if row["what"] == "coverage"]),
         *_share_lines([row for row in rows if row["what"] == "share"]),
