@@ -194,13 +194,14 @@ def test_a_rolling_ball_is_never_looked_past() -> None:
         assert planner.plan(replace(still, ball_velocity=np.array([0.0, -2.0]))) is None
 
 
-def test_a_look_is_held_until_the_head_has_been_there_and_then_given_up() -> None:
+def test_a_look_away_is_held_until_the_head_has_been_there_and_then_given_up() -> None:
     planner = GazePlanner(PARAMETERS, FIELD.without_poles(), ROBOT)
-    assert planner.plan(known(*UNSURE, pose=OUTWARDS)) is not None
+    first = planner.plan(known(*UNSURE, pose=OUTWARDS))
+    assert away([first], (1.0, 0.2)) == 1.0
     held = 1
-    while held < 200 and planner.plan(known(*SURE, age=1.0, pose=OUTWARDS, stamp=10**9 + held * PERIOD)) is not None:
+    while held < 200 and planner.plan(known(*SURE, age=1.0, pose=OUTWARDS, stamp=10**9 + held * PERIOD)) == first:
         held += 1
-    assert PARAMETERS.gaze_look <= held * PERIOD * 1e-9 < 1.5
+    assert 2.0 * PARAMETERS.gaze_look <= held * PERIOD * 1e-9 < 1.5  # the way there, and the look
 
 
 def test_after_a_pause_the_plan_begins_anew() -> None:
