@@ -202,7 +202,7 @@ class HeadMode(IntEnum):
     LOOK_AT = 2
     """Look at `target` and stay on it."""
     TRACK = 3
-    """Look at `target`, with short glances at `glance` every few seconds."""
+    """Look at `glance` while there is one, else at `target`."""
 
 
 @dataclass(frozen=True)
@@ -213,10 +213,33 @@ class HeadCommand:
         stamp: Stamp of the newest input used [ns].
         mode: See `HeadMode`.
         target: (3,) point in base_footprint [m] for LOOK_AT and TRACK.
-        glance: (3,) point in base_footprint [m] for the glances of TRACK, or None for no glances.
+        glance: (3,) point in base_footprint [m] to look at now under TRACK, or None to look at `target`.
     """
 
     stamp: int
     mode: HeadMode
     target: tuple[float, float, float] = (1.0, 0.0, 0.0)
     glance: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True)
+class GazeInput:
+    """What the world model says, as far as it tells where to look.
+
+    Attributes:
+        stamp: [ns].
+        pose: base_footprint in map.
+        covariance: (3, 3) of x [m], y [m], yaw [rad] in map.
+        ball: (2,) in base_footprint [m].
+        ball_velocity: (2,) over the ground, in base_footprint axes [m/s].
+        ball_covariance: (4, 4) of the two, relative to the robot.
+        ball_age: Time since it was last seen [s].
+    """
+
+    stamp: int
+    pose: Pose2D
+    covariance: Array
+    ball: Array
+    ball_velocity: Array
+    ball_covariance: Array
+    ball_age: float

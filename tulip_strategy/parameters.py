@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
+from tulip_motion.gaze import GazeParameters
 from tulip_motion.parameters import MotionParameters
 
 _SIGNED = frozenset({"ready_x", "ready_y", "ready_yaw", "dribble_lateral"})
 
 
 @dataclass(frozen=True)
-class StrategyParameters:
-    """Numbers of the strategy. Distances to the ball run from base_footprint to the ball's centre."""
+class StrategyParameters(GazeParameters):
+    """Numbers of the strategy and its gaze. Distances to the ball run from base_footprint to the ball's centre."""
 
     # Walking: what is asked of the legs.
     forward_speed: float = 0.4  # [m/s] walks 60 s without a fall at this speed
@@ -90,16 +91,10 @@ class StrategyParameters:
     ball_gone_time: float = 1.0  # [s] without any estimate: bridges one that is dropped and made again
     ball_confidence: float = 0.25  # below this it may be a false sighting
     look_back_time: float = 1.5  # [s] look where it was
-    sweep_time: float = 7.0  # [s] one whole sweep of the head, far and near
+    look_back_reach: float = 1.2  # [rad] where it was farther to the side, the body turns there too
+    sweep_time: float = 9.0  # [s] one whole sweep of the head, far and near, lasts 8.6 s
     search_turn_speed: float = 0.5  # [rad/s] slow enough for a picture every 2 deg
     search_walk_time: float = 6.0  # [s] towards the field's middle after a whole turn without a ball
-
-    # Gaze.
-    glance_reach: float = 1.2  # [rad] farther to the side the head needs too long
-    glance_nearest: float = 0.8  # [m] nearer landmarks tell little
-    glance_farthest: float = 7.0  # [m] farther ones are too small
-    glance_period: float = 5.0  # [s] then the next landmark
-    glance_height: float = 0.2  # [m] above the ground: foot and middle of a post in one picture
 
     # Game.
     game_state_limit: float = 30.0  # [s] no referee packet for so long: stand; shorter gaps are lost packets
@@ -110,6 +105,7 @@ class StrategyParameters:
     place_tolerance: float = 0.15  # [m] of walking to a place
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for field in fields(self):
             value = getattr(self, field.name)
             if not isinstance(value, float):

@@ -228,15 +228,24 @@ def test_no_kick_while_motion_control_still_walks() -> None:
     assert all(decision.kick is None for decision in decisions)
 
 
-def test_the_ball_is_tracked_with_glances_at_landmarks_in_front() -> None:
-    player = Player()
-    decisions = player.ticks(3.0 * PARAMETERS.glance_period, ball_at(1.5, 0.3), MotionMode.WALK)
-    assert {decision.head.mode for decision in decisions} == {HeadMode.TRACK}
-    glances = {decision.head.glance for decision in decisions}
-    assert None not in glances
-    goal = ROBOT.inverse().transform((FIELD.opponent_goal.x, 0.0))
-    assert any(glance is not None and glance[:2] == pytest.approx(goal) for glance in glances)
-    assert len(glances) == 2
+def test_a_robot_unsure_of_its_place_glances_at_landmarks_while_it_tracks_the_ball() -> None:
+    outwards = Pose2D(2.25, 1.6, math.pi / 2.0)  # the ball ahead has no landmark beside it
+    for spread, glances in ((0.01, False), (0.3, True)):
+        strategy = Strategy(PARAMETERS, FIELD.without_poles())
+        decisions = []
+        for tick in range(100):
+            robot = RobotEstimate(outwards, np.eye(3) * spread**2, outwards)
+            seen = WorldState(tick * 20_000_000, robot, seen_object(outwards, (2.05, 2.6), (0.0, 0.0)), ())
+            decisions.append(strategy.decide(seen.stamp, seen, game_state(seen.stamp), PLAY, None))
+        assert {decision.head.mode for decision in decisions} == {HeadMode.TRACK}
+        assert any(decision.head.glance is not None for decision in decisions) is glances
+
+
+def test_the_last_steps_before_a_kick_keep_the_ball_in_view() -> None:
+    ball = ball_at(PARAMETERS.kick_ahead + 0.05, 0.0)
+    decisions = Player().ticks(1.0, ball, MotionMode.WALK)
+    assert any("line up" in decision.tree for decision in decisions)
+    assert {decision.head.mode for decision in decisions} == {HeadMode.LOOK_AT}
 
 
 def test_velocities_keep_the_limits_and_change_no_faster_than_allowed() -> None:

@@ -6,6 +6,8 @@ import math
 
 from tulip_description.field import Field
 from tulip_description.planar import Pose2D
+from tulip_description.robot import load_robot
+from tulip_motion.gaze import GazePlanner
 from tulip_motion.interface import HeadMode, KickGoal, MotionState, WalkMode
 from tulip_strategy.behaviour.aim import choose_gap, free_gaps
 from tulip_strategy.behaviour.steering import STILL, Velocity
@@ -128,6 +130,7 @@ class Context:
         dt: Since the last decision [s].
         world, game, user, motion: Inputs.
         ball, aim: What follows from them.
+        gaze: Shares the gaze between ball and landmarks.
         kick_sent: When the running kick was asked for [ns], None without one.
         kick_seen: Whether motion control has reported it.
         mode, velocity, head, target, glance, kick: The wish, see `Decision`.
@@ -144,6 +147,7 @@ class Context:
         self.motion: MotionState | None = None
         self.ball = BallMemory(parameters)
         self.aim = Aim(parameters, field)
+        self.gaze = GazePlanner(parameters, field, load_robot())
         self.kick_sent: int | None = None
         self.kick_seen = False
         self.clear_wish()

@@ -1,11 +1,9 @@
-"""Where the head looks: at the ball, with glances at landmarks that tell where the robot is."""
+"""Where the head looks: at the ball, and at landmarks when the gaze planner finds the robot's place less sure."""
 
 from __future__ import annotations
 
-import math
-
-from tulip_motion.interface import HeadMode
-from tulip_strategy.behaviour.context import Context, Point
+from tulip_motion.interface import GazeInput, HeadMode
+from tulip_strategy.behaviour.context import Context
 
 
 def look_ahead(context: Context) -> None:
@@ -34,41 +32,22 @@ def track_ball(context: Context) -> None:
         return
     look_at_ball(context)
     context.head = HeadMode.TRACK
-    context.glance = glance(context)
+    known = gaze_input(context)
+    context.glance = None if known is None else context.gaze.plan(known)
 
 
-def glance(context: Context) -> tuple[float, float, float] | None:
-    """Return the landmark to glance at [m], in base_footprint: the goal attacked and the nearest, in turns."""
-    parameters = context.parameters
-    if context.world is None:
+def gaze_input(context: Context) -> GazeInput | None:
+    """Return what the gaze planner needs of the world, None while there is no estimate of the ball."""
+    world = context.world
+    if world is None or world.ball is None:
         return None
-    to_robot = context.world.robot.pose.inverse()
-
-    def relative(point: Point) -> Point:
-        return to_robot.transform(point)
-
-    def in_view(point: Point) -> bool:
-        return (
-            abs(math.atan2(point[1], point[0])) <= parameters.glance_reach
-            and parameters.glance_nearest <= math.hypot(*point) <= parameters.glance_farthest
-        )
-
-    goal = relative((context.field.opponent_goal.x, 0.0))
-    landmarks = sorted((point for point in map(relative, _landmarks(context)) if in_view(point)), key=_distance)
-    choice = ([goal] if in_view(goal) else []) + landmarks[:1]
-    if not choice:
-        return None
-    turn = int(context.stamp * 1e-9 / parameters.glance_period)
-    return (*choice[turn % len(choice)], parameters.glance_height)
-
-
-def _distance(point: Point) -> float:
-    return math.hypot(*point)
-
-
-def _landmarks(context: Context) -> list[Point]:
-    field = context.field
-    posts = [(post.x, post.y) for post in field.goal_posts]
-    poles = [(pole.x, pole.y) for pole in field.poles]
-    crossings = [(crossing.x, crossing.y) for crossing in field.crossings]
-    return [*posts, *poles, *crossings, *field.penalty_marks]
+    ball = world.ball
+    return GazeInput(
+        world.stamp,
+        world.robot.pose,
+        world.robot.covariance,
+        ball.position,
+        ball.velocity,
+        ball.covariance,
+        ball.age,
+    )

@@ -92,9 +92,10 @@ class Align(Leaf):
         forward = self._forward(ahead, lined_up)
         x, y = from_aim_frame(forward, parameters.near_gain * offset, aim)
         context.walk(limited((x, y, parameters.heading_gain * aim), parameters))
-        track_ball(context)
         if ahead < parameters.kick_wait_ahead:
-            context.glance = None  # the last steps need the ball in view
+            look_at_ball(context)  # the last steps need the ball in view
+        else:
+            track_ball(context)
         return Status.RUNNING
 
     def _forward(self, ahead: float, lined_up: bool) -> float:

@@ -42,7 +42,7 @@ def _look_back_time(context: Context) -> float:
 def _look_back(context: Context) -> None:
     """Look where the ball was, and turn there where the head alone reaches it badly."""
     bearing = _bearing(context)
-    if abs(bearing) > context.parameters.glance_reach:
+    if abs(bearing) > context.parameters.look_back_reach:
         context.walk((0.0, 0.0, math.copysign(context.parameters.search_turn_speed, bearing)))
     else:
         context.stand()
