@@ -400,7 +400,7 @@ class Motion:
             self._shift = self._estimator.shift = (0.0, 0.0)
 
     def _stabilize(self, estimate: Estimate, reference: Reference) -> Balance:
-        """Return the CMP that brings the measured DCM back to the planned one, within what the body can do."""
+        """Return ZMP and CMP that bring the measured DCM back to the planned one, within what the body can do."""
         # In open loop nothing is corrected: the plan's own DCM leaves the plan's ZMP.
         dcm = estimate.dcm if reference.com is None else reference.dcm
         return stabilize(

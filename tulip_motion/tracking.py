@@ -144,7 +144,7 @@ class Tracking:
         Args:
             estimate: The body.
             reference: What the gait wants.
-            balance: Where the ZMP shall be.
+            balance: Where ZMP and CMP shall be.
             step: The step in progress if the robot walks in the default gait.
         """
         p, kinematics = self._parameters, self._kinematics

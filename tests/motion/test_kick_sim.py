@@ -8,7 +8,6 @@ import pytest
 
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.interface import KickGoal, KickKind, MotionMode, Side, WalkCommand, WalkMode
-from tulip_motion.parameters import MotionParameters
 from tulip_sim.bench.body import Body
 from tulip_strategy.parameters import StrategyParameters
 
@@ -81,9 +80,7 @@ def test_strategy_lines_the_ball_up_where_a_forward_kick_expects_it(side: Side) 
     body.go(1.5, (0.0, 0.0, 0.0))  # the feet as a walk leaves them
     body.go(2.5)
     expected = body.motion.expected_ball(KickKind.FORWARD, side)
-    # A walk may leave the feet closer or wider by the closing tolerance, and each of them by half of it.
-    tolerance = 0.5 * MotionParameters().closing_tolerance
-    assert expected == pytest.approx((strategy.kick_ahead, outward * strategy.kick_lateral), abs=tolerance)
+    assert expected == pytest.approx((strategy.kick_ahead, outward * strategy.kick_lateral), abs=0.01)
 
 
 @pytest.mark.parametrize("side", Side)
