@@ -208,7 +208,7 @@ def test_covariance_stays_symmetric_and_positive_semidefinite_whatever_is_seen(s
         assert -math.pi <= localization.pose.yaw < math.pi
 
 
-@pytest.mark.parametrize("wrong", [{"tilt_time": 0.0}, {"gate_probability": 1.0}, {"association_odds": 0.5}])
+@pytest.mark.parametrize("wrong", [{"pose_error_time": 0.0}, {"gate_probability": 1.0}, {"association_odds": 0.5}])
 def test_parameters_out_of_range_are_refused_by_name(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         LocalizationParameters(**wrong)
