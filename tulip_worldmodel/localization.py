@@ -211,26 +211,9 @@ class Localization:
             total += math.exp(each.log_weight) * (covariance + np.outer(off, off))
         return total
 
-    def _own_spread(self, feature: Feature) -> Feature:
-        """Return a feature with the spread that it does not share with all others of its picture.
-
-        The camera pose's share, as vision puts it in (`View.spreads`), is in the state. A roll about the line of sight
-        moves the azimuth of what lies below the horizon.
-        """
-        p = self._parameters
-        azimuth, elevation = feature.azimuth_spread**2, feature.elevation_spread**2
-        azimuth -= p.pose_azimuth_spread**2
-        if not math.isnan(feature.elevation):
-            azimuth -= (p.pose_elevation_spread * math.tan(feature.elevation)) ** 2
-            elevation = max(elevation - p.pose_elevation_spread**2, LEAST_SPREAD**2)
-        azimuth, scale = max(azimuth, LEAST_SPREAD**2), self._scale.value
-        return replace(
-            feature, azimuth_spread=scale * math.sqrt(azimuth), elevation_spread=scale * math.sqrt(elevation)
-        )
-
     def _observation(self, feature: Feature, camera_position: Array) -> tuple[Observation | None, str]:
         p = self._parameters
-        feature = self._own_spread(feature)
+        feature = own_spread(feature, p, self._scale.value)
         lowest = -math.atan2(float(camera_position[2]), p.longest_range)
         if feature.kind is FeatureClass.LINE:
             if not (feature.elevation < HORIZON and feature.end_elevation < HORIZON):
@@ -247,3 +230,24 @@ class Localization:
         if math.isnan(feature.elevation) and feature.kind in CROSSINGS:
             return None, "a crossing without elevation"
         return PointObservation(feature, self._landmarks.points[feature.kind], camera_position, p.landmark_spread), ""
+
+
+def own_spread(feature: Feature, parameters: LocalizationParameters, scale: float) -> Feature:
+    """Return a feature with the spread that it does not share with all others of its picture.
+
+    The camera pose's share, as vision puts it in (`View.spreads`), is in the state. A roll about the line of sight
+    moves the azimuth of what lies below the horizon.
+
+    Args:
+        feature: As vision gives it.
+        parameters: Of which the spreads of the camera's pose count.
+        scale: How many times worse vision is than it says (noise_scale.py).
+    """
+    p = parameters
+    azimuth = feature.azimuth_spread**2 - p.pose_azimuth_spread**2
+    elevation = feature.elevation_spread**2
+    if not math.isnan(feature.elevation):
+        azimuth -= (p.pose_elevation_spread * math.tan(feature.elevation)) ** 2
+        elevation = max(elevation - p.pose_elevation_spread**2, LEAST_SPREAD**2)
+    azimuth = max(azimuth, LEAST_SPREAD**2)
+    return replace(feature, azimuth_spread=scale * math.sqrt(azimuth), elevation_spread=scale * math.sqrt(elevation))
