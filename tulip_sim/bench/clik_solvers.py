@@ -79,7 +79,7 @@ def replay_own(reference: WalkReference, dead_beat: bool = False) -> Replay:
 
 def at_rest(instant: Instant) -> Instant:
     """Return the same places without velocities."""
-    target, zero = instant.target, np.zeros(3)
+    target, zero = instant.target, (0.0, 0.0, 0.0)
     foot = target.foot._replace(velocity=zero, yaw_rate=0.0)
     return replace(instant, target=target._replace(com_velocity=zero, torso_angular_velocity=zero, foot=foot))
 
@@ -103,7 +103,7 @@ def replay_pink(reference: WalkReference, limited: bool, solver: str | None = No
     wanted = [
         (
             instant.stance,
-            instant.target.com,
+            np.array(instant.target.com),
             pin.SE3(instant.target.torso_rotation, np.zeros(3)),
             instant.foot_places(),
         )
