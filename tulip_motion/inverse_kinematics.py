@@ -15,11 +15,10 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import eigenpy
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.linalg.blas import dsyrk
-from scipy.linalg.lapack import dpotrf, dpotrs
 
 from tulip_description import frames
 from tulip_description.planar import Pose2D
@@ -34,8 +33,8 @@ MAX_POSITION_ERROR = 0.1  # [m] feedback acts on no more: a target that jumps is
 MAX_ORIENTATION_ERROR = 1.0  # [rad] likewise; eq. (11) has no inverse at pi / 2
 TWICE_LEAST_COSINE = 2.0 * math.cos(MAX_ORIENTATION_ERROR)
 SINGULAR_VALUE = 0.03  # of J, below which damping grows; walking at 0.6 m/s stays above 0.048, a kick above 0.040
-NEARLY_SINGULAR = 0.06  # below it, the singular value is looked at every tick, else every `LOOK` ticks
-LOOK = 4  # [ticks]
+LOOK = 4  # [ticks] between looks at the singular value; it was found to fall by 0.0035 meanwhile at most
+NEARLY_SINGULAR = 0.037  # below it every tick has a look
 REPORTED_POSITION_ERROR = 0.03  # [m] walking stays below 0.005, so more means that the target is out of reach
 REPORTED_ORIENTATION_ERROR = 0.15  # [rad]
 LEG_COLUMNS = (slice(0, 6), slice(6, 12))
@@ -178,16 +177,13 @@ class InverseKinematics:
     joint speeds keep to the robot's limits, and `notes` says what is the matter.
     """
 
-    def __init__(
-        self, model: Any, gain_position: float, gain_orientation: float, damping: float, joint_limits: Array
-    ) -> None:
+    def __init__(self, model: Any, gain_position: float, gain_orientation: float, joint_limits: Array) -> None:
         """Make a solver.
 
         Args:
             model: Pinocchio model of the legs with a free flyer at base_link; its speed limits are kept to.
             gain_position: K_p of eq. (10) [1/s].
             gain_orientation: K_o of eq. (10) [1/s].
-            damping: Added to the diagonal of J^T J, always; near singular postures more is added.
             joint_limits: (2, 12) lowest and highest joint angles [rad].
         """
         self.model = model
@@ -195,8 +191,6 @@ class InverseKinematics:
         self.sole_frames = (model.getFrameId(frames.LEFT_SOLE), model.getFrameId(frames.RIGHT_SOLE))
         self._gain_position = gain_position
         self._gain_orientation = gain_orientation
-        self._damping = damping
-        self._damping_matrix = np.asfortranarray(damping * np.eye(12))
         self._joint_limits = joint_limits
         self._per_speed_limit = 1.0 / model.velocityLimit[6:]
         self.configuration = pin.neutral(model)
@@ -233,12 +227,14 @@ class InverseKinematics:
         self._jacobian = self._jacobian_transposed.T
         self._leg_rows = (self._jacobian_transposed[:6], self._jacobian_transposed[6:])
         self._com_rows = self._jacobian_transposed[:, :3]
-        self._factor = np.eye(12)
+        # Eigen's factorizations, which take less time than those of LAPACK for so few numbers.
+        self._lu, self._lu_transposed = eigenpy.PartialPivLU(12), eigenpy.PartialPivLU(12)
+        self._damped = eigenpy.LLT(12)
         self.twist_to_base = np.eye(6)
         """(6, 6) from a twist about odom's origin to the base's velocity in its own axes."""
         self._base_of_stance = np.zeros((6, 6))
-        self._weakest = np.full(12, 1.0 / math.sqrt(12.0))
-        self._singular_value = 1.0
+        self._weakest = np.full(12, math.nan)  # not known yet
+        self._singular_value = 0.0
         self._rate = np.zeros(12)
         self._target: TaskTarget | None = None
         self._anchor_pose: Pose2D | None = None
@@ -251,6 +247,7 @@ class InverseKinematics:
         self.configuration[3:7] = pin.Quaternion(base_rotation).coeffs()
         self.configuration[7:] = joint_positions
         self.velocity[:] = 0.0
+        self._weakest[:], self._singular_value = math.nan, 0.0
 
     @property
     def jacobian(self) -> Array:
@@ -309,7 +306,8 @@ class InverseKinematics:
     def update_jacobian(self, stance: Side) -> None:
         """Compute the kinematics of the present posture, and J for a stance foot."""
         model, data = self.model, self.data
-        self._stance = stance
+        if stance is not self._stance:
+            self._stance, self._singular_value = stance, 0.0
         # One pass gives placements, CoM, its Jacobian, and the joints' twists about odom's origin (data.J).
         pin.jacobianCenterOfMass(model, data, self.configuration, False)
         for frame in self.sole_frames:
@@ -338,7 +336,7 @@ class InverseKinematics:
             *linear_rate(foot.position, self.sole_positions[other].tolist(), foot.velocity, k_p),
             *angular_rate(turn_from_yaw(foot.yaw, self._sole_rotations[other]), (0.0, 0.0, foot.yaw_rate), k_o),
         )
-        joints = self._damped_solve(self._rate)
+        joints = self._solve(self._rate)
         shares = joints * self._per_speed_limit
         if shares.dot(shares) > 1.0:  # else none of them is greater than 1
             joints /= max(1.0, np.abs(shares).max())
@@ -360,7 +358,7 @@ class InverseKinematics:
         self._drift_of_foot[:] = foot_drift.vector
         wanted = task_acceleration - self._task_of_stance.T.dot(stance_drift) - self._drift
         generalized = np.empty(18)
-        joints = generalized[6:] = self._damped_solve(wanted)
+        joints = generalized[6:] = self._solve(wanted)
         stance_twist = stance_drift + self.leg_twists[stance].dot(joints[LEG_COLUMNS[stance]])
         generalized[:6] = -self.twist_to_base.dot(stance_twist)
         return generalized
@@ -387,26 +385,38 @@ class InverseKinematics:
             self._set_joint_velocities(np.where(joints == wanted, self._joint_velocity, 0.0))
 
     def _factorize(self) -> None:
-        """Factorize J^T J + damping, once for velocities and accelerations, and see how singular it is.
-
-        One inverse iteration now and then, begun from the last result, keeps `_weakest` on the direction of joint
-        space that moves the task least, and gives its singular value (Maciejewski and Klein, 1988).
-        """
-        # BLAS and LAPACK without scipy's checks, which cost more than the work. Damped, it cannot fail.
-        self._factor, _ = dpotrf(dsyrk(1.0, self._jacobian, beta=1.0, c=self._damping_matrix, trans=1), clean=0)
+        """Factorize J, once for velocities and accelerations, and J^T J + damping where J is nearly singular."""
+        self._lu.compute(self._jacobian)
         self._updates += 1
-        if self._updates % LOOK == 1 or self._singular_value < NEARLY_SINGULAR:
-            grown = dpotrs(self._factor, self._weakest)[0]
-            growth = math.sqrt(grown.dot(grown))
-            np.multiply(grown, 1.0 / growth, out=self._weakest)
-            self._singular_value = math.sqrt(max(1.0 / growth - self._damping, 0.0))
+        if self._updates % LOOK == 0 or self._singular_value < NEARLY_SINGULAR:
+            self._look_for_singularity()
         if self._singular_value < SINGULAR_VALUE:
             # From nothing at the threshold to SINGULAR_VALUE^2 where the direction is lost.
-            damping = (self._damping + SINGULAR_VALUE**2 - self._singular_value**2) * np.eye(12)
-            self._factor, _ = dpotrf(dsyrk(1.0, self._jacobian, beta=1.0, c=damping, trans=1), clean=0)
+            damping = SINGULAR_VALUE**2 - self._singular_value**2
+            self._damped.compute(self._jacobian_transposed.dot(self._jacobian) + damping * np.eye(12))
 
-    def _damped_solve(self, rate: Array) -> Array:
-        solution: Array = dpotrs(self._factor, self._jacobian_transposed.dot(rate))[0]
+    def _look_for_singularity(self) -> None:
+        """Update the smallest singular value of J, and the direction of joint space that moves the task least.
+
+        One inverse iteration, begun from the last result, keeps up with both (Maciejewski and Klein, 1988). Without a
+        last result, or at a posture that is singular altogether, all singular values are computed.
+        """
+        self._lu_transposed.compute(self._jacobian_transposed)
+        grown = self._lu.solve(self._lu_transposed.solve(self._weakest))
+        growth = math.sqrt(grown.dot(grown))
+        if math.isfinite(growth):
+            np.multiply(grown, 1.0 / growth, out=self._weakest)
+            self._singular_value = math.sqrt(1.0 / growth)
+        else:
+            _, values, directions = np.linalg.svd(self._jacobian)
+            self._weakest[:], self._singular_value = directions[-1], float(values[-1])
+
+    def _solve(self, rate: Array) -> Array:
+        """Return J^-1 times a (12,) task velocity or acceleration, damped where J is nearly singular."""
+        if self._singular_value < SINGULAR_VALUE:
+            solution: Array = self._damped.solve(self._jacobian_transposed.dot(rate))
+        else:
+            solution = self._lu.solve(rate)
         return solution
 
     def _set_joint_velocities(self, joints: Array) -> None:

@@ -72,7 +72,7 @@ class Tracking:
         p = self._parameters = parameters
         self._model = model
         self._kinematics = InverseKinematics(
-            model, p.clik_gain_position, p.clik_gain_orientation, p.clik_damping, robot.position_limits[:, :12]
+            model, p.clik_gain_position, p.clik_gain_orientation, robot.position_limits[:, :12]
         )
         self._gains = JointGains(p)
         self._effort_limits = (-robot.effort_limits[:12], robot.effort_limits[:12])

@@ -41,7 +41,7 @@ def zmp_of(dynamics: Dynamics) -> Any:
 def on_left_foot(task_acceleration: np.ndarray) -> Dynamics:
     """Return the dynamics of a robot at rest on both feet that accelerates."""
     posture = standing_posture(load_robot())
-    kinematics = InverseKinematics(floating_model(ROBOT), 20.0, 20.0, 1e-9, ROBOT.position_limits[:, :12])
+    kinematics = InverseKinematics(floating_model(ROBOT), 20.0, 20.0, ROBOT.position_limits[:, :12])
     kinematics.reset(np.eye(3), np.array([posture.base_x, 0.0, posture.base_height]), posture.joint_positions[:12])
     kinematics.update_jacobian(Side.LEFT)
     return inverse_dynamics(kinematics, np.zeros(18), kinematics.solve_acceleration(task_acceleration))
