@@ -47,7 +47,7 @@ class LocalizationParameters:
     lost_evidence: float = (
         8.0  # nats of Page's test that say "lost": about one false alarm in 3000 independent pictures
     )
-    usual_evidence: float = 0.35  # nats that a picture takes off: 0.15 false findings where right, 0.5 where wrong
+    usual_evidence: float = 0.35  # nats a picture takes off: unexplained are 0.15 where right, 0.5 where wrong
     most_evidence: float = 1.0  # nats that one picture can add: what it shows wrongly, the next one shows, too
     seed_share: float = 0.1  # of all weight, that goes to new hypotheses at each picture while lost
     seeds: int = 8  # new hypotheses a picture at most
