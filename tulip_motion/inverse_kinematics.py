@@ -232,7 +232,6 @@ class InverseKinematics:
         self._damped = eigenpy.LLT(12)
         self.twist_to_base = np.eye(6)
         """(6, 6) from a twist about odom's origin to the base's velocity in its own axes."""
-        self._base_of_stance = np.zeros((6, 6))
         self._weakest = np.full(12, math.nan)  # not known yet
         self._singular_value = 0.0
         self._rate = np.zeros(12)
@@ -320,7 +319,6 @@ class InverseKinematics:
         np.dot(twists[other].T, self._task_of_other, out=rows[other])
         np.add(self._com_rows, self._com_of_joints, out=self._com_rows)
         self.twist_to_base = self._base.toActionMatrixInverse()
-        self._base_of_stance = self.twist_to_base.dot(twists[stance])
         self._factorize()
 
     def solve_velocity(self, target: TaskTarget) -> None:
@@ -422,4 +420,5 @@ class InverseKinematics:
     def _set_joint_velocities(self, joints: Array) -> None:
         """Set the joints' speeds and the base's that leaves the stance sole at rest."""
         self._joint_velocity[:] = joints
-        np.negative(self._base_of_stance.dot(joints[LEG_COLUMNS[self._stance]]), out=self._base_velocity)
+        stance_twist = self.leg_twists[self._stance].dot(joints[LEG_COLUMNS[self._stance]])
+        np.negative(self.twist_to_base.dot(stance_twist), out=self._base_velocity)

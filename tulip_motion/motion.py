@@ -61,7 +61,7 @@ class Motion:
         p = self._parameters = parameters
         # The head is light and near its axes: the legs are controlled as if it looked straight ahead.
         model = floating_model(with_fixed_head(robot))
-        self._estimator = StateEstimator(p, model, np.array([foot.cells for foot in robot.feet]), np.eye(3))
+        self._estimator = StateEstimator(p, model, np.array([foot.cells for foot in robot.feet]))
         self._tracking = Tracking(p, model, robot)
         self._soles = robot.feet
         self._reach = reach(p, robot)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tulip_description import frames
 from tulip_description.planar import Pose2D
-from tulip_description.quaternion import Quaternion, quaternion_conjugate, quaternion_product, quaternion_yaw
+from tulip_description.quaternion import Quaternion, quaternion_product, quaternion_yaw
 from tulip_description.robot_io import Sensors
 from tulip_motion.footsteps import Footstep
 from tulip_motion.interface import Side
@@ -96,14 +96,13 @@ class Estimate(NamedTuple):
 class StateEstimator:
     """Says where the body is, from where the soles stand and what IMU and joints say."""
 
-    def __init__(self, parameters: MotionParameters, model: Any, cell_positions: Array, imu_rotation: Array) -> None:
+    def __init__(self, parameters: MotionParameters, model: Any, cell_positions: Array) -> None:
         """Make an estimator.
 
         Args:
             parameters: Of motion control.
             model: Pinocchio model of the legs with a free flyer at base_link.
             cell_positions: (2, 4, 2) force cells in the left and right sole frame [m].
-            imu_rotation: (3, 3) from imu_link to base_link.
         """
         self._parameters = parameters
         self._time_constant = time_constant(parameters.com_height)
@@ -111,8 +110,6 @@ class StateEstimator:
         data = self._data = model.createData()
         self._sole_frames = (model.getFrameId(frames.LEFT_SOLE), model.getFrameId(frames.RIGHT_SOLE))
         self._cells = cell_positions.tolist()
-        self._imu_rotation = imu_rotation
-        self._imu_to_base = quaternion_conjugate(tuple(pin.Quaternion(imu_rotation).coeffs().tolist()))
         self._configuration = pin.neutral(model)
         self._velocity = np.zeros(model.nv)
         # Views into Pinocchio's data, made once: making one takes as long as what is done with it.
@@ -162,7 +159,7 @@ class StateEstimator:
         q[3:7] = self._attitude(sensors)
         joint_positions, joint_velocities = sensors.joint_positions[:12], sensors.joint_velocities[:12]
         q[7:] = joint_positions
-        v[3:6] = self._imu_rotation.dot(sensors.imu_angular_velocity)
+        v[3:6] = sensors.imu_angular_velocity  # the axes of imu_link are those of base_link
         v[6:] = joint_velocities
         model, data = self._model, self._data
         # The base stays at the origin and at rest: where it is and how it moves follows from the feet.
@@ -188,7 +185,7 @@ class StateEstimator:
             base_position,
             rotation,
             base_velocity,
-            rotation.dot(v[3:6]),
+            rotation.dot(sensors.imu_angular_velocity),
             joint_positions,
             joint_velocities,
             com,
@@ -203,7 +200,7 @@ class StateEstimator:
 
     def _attitude(self, sensors: Sensors) -> Quaternion:
         """Return the attitude of base_link; its heading counts from the one at the start."""
-        attitude = quaternion_product(tuple(sensors.imu_orientation.tolist()), self._imu_to_base)
+        attitude = sensors.imu_orientation.tolist()
         if self._heading_offset is None:
             half = -0.5 * quaternion_yaw(attitude)
             self._heading_offset = (0.0, 0.0, math.sin(half), math.cos(half))
