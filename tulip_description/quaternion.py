@@ -29,12 +29,6 @@ def quaternion_product(a: Sequence[float], b: Sequence[float]) -> Quaternion:
     )
 
 
-def quaternion_conjugate(a: Sequence[float]) -> Quaternion:
-    """Return the inverse rotation."""
-    x, y, z, w = a
-    return -x, -y, -z, w
-
-
 def quaternion_yaw(a: Sequence[float]) -> float:
     """Return the heading of the rotated x axis [rad]."""
     x, y, z, w = a

@@ -14,7 +14,6 @@ from tulip_description.planar import wrap_angle
 from tulip_description.quaternion import (
     Quaternion,
     pose_on_ground,
-    quaternion_conjugate,
     quaternion_matrix,
     quaternion_product,
     quaternion_yaw,
@@ -29,14 +28,10 @@ def quaternion(turn: np.ndarray) -> Quaternion:
 
 
 @given(vectors, vectors)
-def test_a_product_is_that_of_rotations_and_with_its_conjugate_it_is_none(
-    a: tuple[float, ...], b: tuple[float, ...]
-) -> None:
+def test_a_product_is_that_of_rotations(a: tuple[float, ...], b: tuple[float, ...]) -> None:
     first, second = pin.exp3(np.array(b)), pin.exp3(np.array(a))
     product = quaternion_product(quaternion(second), quaternion(first))
     np.testing.assert_allclose(quaternion_matrix(product), second @ first, atol=1e-12)
-    back = quaternion_product(product, quaternion_conjugate(product))
-    np.testing.assert_allclose(back, (0.0, 0.0, 0.0, 1.0), atol=1e-12)
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
