@@ -241,16 +241,19 @@ class Lens:
         return math.tan(self.largest_angle + 1e-12) if self.largest_angle < math.radians(89.0) else None
 
     @cached_property
+    def _pixel_scale(self) -> tuple[Array, Array]:
+        """Focal lengths (fx, fy) and middle (cx, cy) [px]."""
+        return self.camera_matrix[[0, 1], [0, 1]], self.camera_matrix[:2, 2]
+
+    @cached_property
     def _least_cosine(self) -> float:
         # Rounding must not cost the last direction, which projects where `rays` came from.
         return math.cos(self.largest_angle) - 1e-12
 
     def _to_pixels(self, points: Array) -> Array:
         """Return (n, 2) pixels of (n, 2) points of the image plane at distance 1."""
-        (fx, _, cx), (_, fy, cy), _ = self.camera_matrix.tolist()
-        pixels = np.empty(points.shape)
-        pixels[:, 0] = fx * points[:, 0] + cx
-        pixels[:, 1] = fy * points[:, 1] + cy
+        focal_lengths, middle = self._pixel_scale
+        pixels: Array = points * focal_lengths + middle
         return pixels
 
 

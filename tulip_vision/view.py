@@ -83,6 +83,7 @@ class View:
         self.rotation = rotation
         self.position = transform[:3, 3].copy()
         self.spread = spread
+        self._coarse_sines: dict[int, NDArray[np.float32]] = {}
 
     @cached_property
     def middle_sines(self) -> Array:
@@ -92,9 +93,11 @@ class View:
 
     def coarse_sines(self, step: int) -> NDArray[np.float32]:
         """Return (rows, columns) sine of the elevation seen at the pixels of `Lens.coarse_ray_table`."""
-        rays = self.lens.coarse_ray_table(step)
-        sines: NDArray[np.float32] = rays.reshape(-1, 3) @ self.rotation[2].astype(np.float32)
-        return sines.reshape(rays.shape[:2])
+        if step not in self._coarse_sines:
+            rays = self.lens.coarse_ray_table(step)
+            sines: NDArray[np.float32] = rays.reshape(-1, 3) @ self.rotation[2].astype(np.float32)
+            self._coarse_sines[step] = sines.reshape(rays.shape[:2])
+        return self._coarse_sines[step]
 
     @cached_property
     def below_horizon(self) -> Mask:
@@ -186,13 +189,9 @@ class View:
 
     def inside(self, pixels: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Return (n,) whether (n, 2) pixels lie in the picture, `margin` pixels from its edges."""
-        with np.errstate(invalid="ignore"):
-            found: NDArray[np.bool_] = (
-                (pixels[:, 0] >= margin)
-                & (pixels[:, 1] >= margin)
-                & (pixels[:, 0] <= self.lens.width - 1 - margin)
-                & (pixels[:, 1] <= self.lens.height - 1 - margin)
-            )
+        u, v = pixels.T
+        found: NDArray[np.bool_] = (u >= margin) & (u <= self.lens.width - 1 - margin)  # NaN is neither
+        found &= (v >= margin) & (v <= self.lens.height - 1 - margin)
         return found
 
     def sample(self, image: NDArray[Any], pixels: Array) -> tuple[NDArray[Any], NDArray[np.bool_]]:
@@ -209,9 +208,12 @@ class View:
     ) -> tuple[list[NDArray[Any]], NDArray[np.bool_]]:
         """Read several images at the same (n, 2) pixels, as `sample` does one."""
         inside = self.inside(pixels)
+        whole = bool(inside.all())
         # Half a pixel is added and cut off: that rounds, as no pixel inside is negative.
-        nearest = (np.where(inside[:, None], pixels, 0.0) + 0.5).astype(np.intp)
-        return [np.where(inside, image[nearest[:, 1], nearest[:, 0]], 0) for image in images], inside
+        u, v = ((pixels if whole else np.where(inside[:, None], pixels, 0.0)) + 0.5).astype(np.intp).T
+        index = v * self.lens.width + u
+        read = [image.reshape(-1)[index] for image in images]
+        return read if whole else [np.where(inside, values, 0) for values in read], inside
 
     def coverage(self) -> Array:
         """Return (4,) azimuth of left and right edge, elevation of lower and upper edge, at the middle [rad]."""
