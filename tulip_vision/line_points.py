@@ -27,6 +27,11 @@ MARGIN = 2.0
 SLIMMEST = 0.4
 """Least thickness of a line over the largest: two thirds of what is expected at a right angle."""
 
+LONGEST_SHORT = 10
+"""[px] up to which the middle of a run is found from how white its pixels are."""
+BESIDE = 2
+"""[px] of blur to either side, that count for the middle."""
+
 
 @dataclass(frozen=True)
 class LinePointParameters:
@@ -99,9 +104,9 @@ def find_line_points(segmentation: Segmentation, view: View, parameters: LinePoi
     contrast = _contrast(slant, segmentation.brightness, view, parameters)
     # Where there is no carpet the side is white beyond measure: nothing stands out from it.
     side = cv2.max(segmentation.whiteness, cv2.compare(segmentation.mask(Colour.GREEN), 0, cv2.CMP_EQ))
-    found = []
     middle = int(np.searchsorted(-slant[first:last], -parameters.near)) + first
     margin = 12  # [px] runs at the border between the two bands belong to both
+    runs = []  # column and row at which each begins, and its length [px]; those of vertical cuts first
     for low, high, step in (
         (first, min(middle + margin, last), parameters.column_step // 2),
         (max(middle - margin, first), last, parameters.column_step),
@@ -113,18 +118,23 @@ def find_line_points(segmentation: Segmentation, view: View, parameters: LinePoi
         place = np.arange(low, high)
         sides = side[:, columns]
         higher = cv2.max(sides[np.maximum(place - reach, 0)], sides[np.minimum(place + reach, len(side) - 1)])
-        own = segmentation.whiteness[low:high, columns]
-        white = cv2.subtract(own, higher) > contrast[low:high, None]
-        cut, where = _runs(white.T, own.T, np.broadcast_to(reach, white.T.shape))
-        found.append(np.column_stack([step // 2 + step * cut, where + low]))
+        white = cv2.subtract(segmentation.whiteness[low:high, columns], higher) > contrast[low:high, None]
+        cut, start, length = _runs(white.T, np.broadcast_to(reach, white.T.shape))
+        runs.append((step // 2 + step * cut, start + low, length))
+    vertical = sum(len(length) for _, _, length in runs)
     steps = np.where(slant[first:last] < parameters.near, parameters.row_step, parameters.row_step // 4)
     chosen = first + np.flatnonzero((np.arange(first, last) % steps) == 0)
     reach = np.minimum(np.rint(across_column[chosen]), LONGEST_REACH).astype(np.intp)
-    own = segmentation.whiteness[chosen]
-    white = cv2.subtract(own, _higher_side(side[chosen], reach)) > contrast[chosen, None]
-    cut, where = _runs(white, own, np.broadcast_to(reach[:, None], white.shape))
-    found.append(np.column_stack([where, chosen[cut]]))
-    pixels = np.concatenate(found)
+    white = cv2.subtract(segmentation.whiteness[chosen], _higher_side(side[chosen], reach)) > contrast[chosen, None]
+    cut, start, length = _runs(white, np.broadcast_to(reach[:, None], white.shape))
+    runs.append((start, chosen[cut], length))
+    u, v, length = (np.concatenate(each) for each in zip(*runs, strict=True))
+    stride = np.ones(len(u), dtype=np.intp)
+    stride[:vertical] = view.lens.width
+    middles = _middles(segmentation.whiteness.reshape(-1), v * view.lens.width + u, stride, length)
+    pixels = np.stack([u, v], axis=1).astype(np.float64)
+    pixels[:vertical, 1] += middles[:vertical]
+    pixels[vertical:, 0] += middles[vertical:]
     nearest = np.rint(pixels).astype(np.intp)
     pixels = pixels[segmentation.on_carpet[nearest[:, 1], nearest[:, 0]] != 0]
     rays = view.lens.rays_inside(pixels)
@@ -181,38 +191,49 @@ def _higher_side(rows: NDArray[np.uint8], reach: NDArray[np.intp]) -> NDArray[np
 
 
 def _runs(
-    white: NDArray[np.bool_], whiteness: NDArray[np.uint8], reach: NDArray[np.intp]
-) -> tuple[NDArray[np.intp], Array]:
-    """Find the runs of white pixels in each row of an array, and their middles.
+    white: NDArray[np.bool_], reach: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Find the runs of white pixels in each row of an array that are as thick as a line.
 
     Args:
         white: (cuts, length).
-        whiteness: (cuts, length) 0 to 255.
         reach: (cuts, length) more than the expected width [px]; runs longer than twice that are no lines.
 
     Returns:
-        (n,) index of the cut, and (n,) place of the run's middle within it [px].
+        For each run the index of its cut, its first place within that, and its length [px].
     """
     cuts, length = white.shape
     padded = np.zeros((cuts, length + 2), dtype=np.bool_)
     padded[:, 1:-1] = white
     # Each row begins and ends without white, so that beginnings and ends of runs take turns.
     change = np.flatnonzero(padded[:, 1:] != padded[:, :-1])  # in a row of length + 1
-    start, end = change[0::2], change[1::2]
-    cut = start // (length + 1)
-    start, end = start % (length + 1), end % (length + 1)
-    expected = reach[cut, (start + end) // 2]
-    thin = (end - start <= 2 * expected) & (start > 0) & (end < length)
-    thin &= end - start >= SLIMMEST * (expected - MARGIN)  # threads of a net are white too
-    cut, start, end = cut[thin], start[thin], end[thin]
-    middle = 0.5 * (start + end - 1)
-    short = np.flatnonzero(end - start <= 10)
-    if len(short):
-        # Few pixels: the centre of what each has of the paint is exact to a tenth of a pixel.
-        window = start[short, None] - 2 + np.arange(14)
-        used = (window >= 0) & (window < length) & (window < end[short, None] + 2)
-        values = whiteness[cut[short, None], np.clip(window, 0, length - 1)].astype(np.float64)
-        floor = np.where(used, values, np.inf).min(axis=1, keepdims=True)
-        weights = np.where(used, values - floor, 0.0)
-        middle[short] = (weights * window).sum(axis=1) / np.maximum(weights.sum(axis=1), 1e-9)
-    return cut, middle
+    cut, start = np.divmod(change[0::2], length + 1)
+    long = change[1::2] - change[0::2]
+    expected = reach[cut, start + long // 2]
+    thin = (long <= 2 * expected) & (start >= BESIDE) & (start + long <= length - BESIDE)
+    thin &= long >= SLIMMEST * (expected - MARGIN)  # threads of a net are white too
+    return cut[thin], start[thin], long[thin]
+
+
+def _middles(
+    whiteness: NDArray[np.uint8], start: NDArray[np.intp], stride: NDArray[np.intp], length: NDArray[np.intp]
+) -> Array:
+    """Return (n,) how far the middle of each run is from its first pixel [px].
+
+    Args:
+        whiteness: Of all pixels, row by row.
+        start: (n,) index of each run's first pixel.
+        stride: (n,) from one pixel of the run to the next.
+        length: (n,) [px].
+    """
+    middles = 0.5 * (length - 1)
+    short = np.flatnonzero(length <= LONGEST_SHORT)
+    # Few pixels: the centre of what each has of the paint is exact to a tenth of a pixel.
+    window = np.arange(-BESIDE, LONGEST_SHORT + BESIDE)[:, None]
+    used = window < length[short] + BESIDE  # (window, runs): sums over the first axis are faster
+    index = start[short] + window * stride[short]
+    values = whiteness.take(index, mode="clip")  # clipped: beyond the last line, but not used then
+    floor = np.where(used, values, np.uint8(255)).min(axis=0)
+    weights = np.where(used, values - floor, np.uint8(0)).astype(np.float32)
+    middles[short] = (window[:, 0].astype(np.float32) @ weights) / np.maximum(weights.sum(axis=0), 1e-6)
+    return middles

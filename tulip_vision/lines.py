@@ -176,7 +176,8 @@ def _local_directions(points: LinePoints, radius: float) -> tuple[Array, NDArray
     x, y = flat[:, 0][other] - flat[:, 0][one], flat[:, 1][other] - flat[:, 1][one]
     # Far away the cuts are closer together, and so are the lines.
     kept = (points.near[one] & points.near[other]) | (x * x + y * y < (FAR_NEIGHBOURHOOD * radius) ** 2)
-    one, other, x, y = one[kept], other[kept], x[kept], y[kept]
+    index = np.flatnonzero(kept)
+    one, other, x, y = one[index], other[index], x[index], y[index]
     first = np.concatenate([one, other])
     x, y = np.concatenate([x, -x]), np.concatenate([y, -y])
     number = np.bincount(first, minlength=count) + 1.0
