@@ -115,7 +115,7 @@ class View:
         if len(mixed):
             part = slice(int(mixed[0]), int(mixed[-1]) + 1)
             sines = cv2.transform(self.lens.ray_table()[part], self.rotation[2:].astype(np.float32))
-            below[part] = np.where(sines < 0.0, np.uint8(255), np.uint8(0))
+            below[part] = cv2.compare(sines, 0.0, cv2.CMP_LT)
         return below
 
     @cached_property
