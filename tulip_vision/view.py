@@ -234,6 +234,12 @@ def direction_of(azimuth: float, elevation: float) -> Array:
     return np.array([level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)])
 
 
+def directions_of(azimuths: Array, elevations: Array) -> Array:
+    """Return (n, 3) unit vectors with (n,) azimuths and elevations [rad]."""
+    level = np.cos(elevations)
+    return np.stack([level * np.cos(azimuths), level * np.sin(azimuths), np.sin(elevations)], axis=1)
+
+
 def fan_of(azimuths: ArrayLike, elevations: ArrayLike) -> Array:
     """Return unit vectors with all pairs of these angles [rad].
 
