@@ -60,7 +60,9 @@ def find_goal_posts(segmentation: Segmentation, view: View, parameters: GoalPara
     """Return the goal posts: azimuth always, elevation of the foot where it is seen on the carpet."""
     posts: list[Feature] = []
     refusals: list[Refusal] = []
-    uprights = find_uprights(segmentation.mask(Colour.YELLOW), segmentation, view, parameters.least_area)
+    top = view.first_row()
+    yellow = segmentation.mask(Colour.YELLOW, top)
+    uprights = find_uprights(yellow, segmentation, view, parameters.least_area, (0, top))
     # Those with a foot first: a part of the same post higher up must not take its place.
     for upright in sorted(uprights, key=lambda each: (not each.foot_seen, each.low)):
         result = _examine(upright, segmentation, view, parameters)

@@ -29,6 +29,8 @@ MOST_CANDIDATES = 8
 
 NEAR_REACH = 0.5
 """[rad] half the angle that an opponent fills whose feet are below the picture: it is less than a metre away."""
+NEAREST = 0.4
+"""[m] along the ground to an opponent's nearest marker: closer, the robots touch."""
 PARTLY_SEEN = 2.5
 """How many times less sure the place of an opponent is that the picture's edge or the own body hides in part."""
 UPRIGHT_RADIUS = 0.15
@@ -117,7 +119,9 @@ def find_opponents(
         parameters: How an opponent is recognised.
     """
     colour = MARKERS[parameters.team_colour][1]
-    found = patches(segmentation.mask(colour), parameters.least_area, MOST_CANDIDATES)
+    above = max(parameters.highest_marker - view.height, 0.0)
+    top = view.first_row(above / math.hypot(above, NEAREST))
+    found = patches(segmentation.mask(colour, top), parameters.least_area, MOST_CANDIDATES, (0, top))
     markers = _markers([(points, area) for points, area in found if _compact(points, area)], view)
     opponents: list[Feature] = []
     reach: list[float] = []  # [rad] half the angle that each opponent fills

@@ -63,8 +63,9 @@ class PoleParameters:
 
 def find_poles(segmentation: Segmentation, view: View, parameters: PoleParameters) -> Findings:
     """Return the landmark poles with the direction of their feet."""
-    blue = np.bitwise_and(segmentation.mask(Colour.BLUE), view.below_horizon)
-    segments = [cv2.boundingRect(points) for points, _ in patches(blue, LEAST_SEGMENT, MOST_SEGMENTS)]
+    first = view.first_row()
+    blue = segmentation.mask(Colour.BLUE, first) & view.below_horizon[first:]
+    segments = [cv2.boundingRect(points) for points, _ in patches(blue, LEAST_SEGMENT, MOST_SEGMENTS, (0, first))]
     if not segments:
         return Findings()
     left, top = (min(segment[axis] for segment in segments) for axis in (0, 1))

@@ -169,9 +169,9 @@ class Segmentation:
     brightness: float
     carpet_share: float
 
-    def mask(self, colours: Colour) -> Mask:
-        """Return (height, width) nonzero where a pixel belongs to one of the classes."""
-        found: Mask = np.bitwise_and(self.classes, np.uint8(colours))
+    def mask(self, colours: Colour, top: int = 0) -> Mask:
+        """Return (height - top, width) nonzero where a pixel from row `top` on belongs to one of the classes."""
+        found: Mask = np.bitwise_and(self.classes[top:], np.uint8(colours))
         return found
 
 

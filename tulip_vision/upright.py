@@ -66,12 +66,8 @@ def find_uprights(
         least_area: Smaller patches are noise [px^2].
         corner: u, v in the picture of the mask's first pixel.
     """
-    left, top, width, height = cv2.boundingRect(mask)
-    if width == 0:
-        return []
-    u, v = corner[0] + left, corner[1] + top
-    horizon = view.below_horizon[v : v + height, u : u + width]
-    below = np.bitwise_and(mask[top : top + height, left : left + width], horizon)
+    u, v = corner
+    below = mask & view.below_horizon[v : v + len(mask), u : u + mask.shape[1]]
     slender = []
     for points, _ in patches(below, least_area, MOST_CANDIDATES, (u, v)):
         _, _, width, height = cv2.boundingRect(points)

@@ -104,7 +104,7 @@ class View:
         """(height, width) 255 where a pixel looks below the horizon, else 0."""
         # Most rows lie on one side of the horizon as a whole, as one pixel in a block tells: only the rest is work.
         coarse = self.coarse_sines(HORIZON_STEP)
-        margin = 2.0 * HORIZON_STEP / float(self.lens.camera_matrix[1, 1])  # more than sines change within a block
+        margin = HORIZON_STEP / float(self.lens.camera_matrix[1, 1])  # twice what sines change within a block
         side = np.zeros(self.lens.height, dtype=np.int8)  # -1 below, 1 above, 0 not known
         blocks = (coarse.min(axis=1) > margin).astype(np.int8) - (coarse.max(axis=1) < -margin)
         rows = np.repeat(blocks, HORIZON_STEP)[: len(side)]
@@ -117,6 +117,13 @@ class View:
             sines = cv2.transform(self.lens.ray_table()[part], self.rotation[2:].astype(np.float32))
             below[part] = cv2.compare(sines, 0.0, cv2.CMP_LT)
         return below
+
+    def first_row(self, sine: float = 0.0) -> int:
+        """Return the picture's first row that may show something lower than an elevation, given by its sine."""
+        lowest = np.fmin.reduce(self.coarse_sines(HORIZON_STEP), axis=1)
+        margin = HORIZON_STEP / float(self.lens.camera_matrix[1, 1])
+        found = np.flatnonzero(lowest < sine + margin)
+        return HORIZON_STEP * int(found[0]) if len(found) else self.lens.height
 
     @cached_property
     def lowest_elevation(self) -> float:
