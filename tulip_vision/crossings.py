@@ -304,7 +304,9 @@ def _medians(values: NDArray[np.uint8], used: NDArray[np.bool_]) -> Array:
     number = used.sum(axis=1)
     ordered = np.sort(np.where(used, values, np.uint8(255)).astype(np.float64), axis=1)
     row = np.arange(len(values))
-    middles = 0.5 * (ordered[row, np.maximum(number - 1, 0) // 2] + ordered[row, np.minimum(number // 2, values.shape[1] - 1)])
+    middles = 0.5 * (
+        ordered[row, np.maximum(number - 1, 0) // 2] + ordered[row, np.minimum(number // 2, values.shape[1] - 1)]
+    )
     return np.where(number > 0, middles, 0.0)
 
 

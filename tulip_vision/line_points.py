@@ -9,28 +9,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tulip_vision.segmentation import Colour, Segmentation
+from tulip_vision.line_cuts import MARGIN, cut_lines
+from tulip_vision.segmentation import Segmentation
 from tulip_vision.view import Array, View
 
 LONGEST_REACH = 60
 """[px] lines at the robot's own feet are not looked for beyond that."""
 SLANTED = 1.6
 """Thickness of a line that runs at up to 50 deg to its cut, over that of one at a right angle."""
-MARGIN = 2.0
-"""[px] blur on both sides."""
-SLIMMEST = 0.4
-"""Least thickness of a line over the largest: two thirds of what is expected at a right angle."""
-
-LONGEST_SHORT = 10
-"""[px] up to which the middle of a run is found from how white its pixels are."""
-BESIDE = 2
-"""[px] of blur to either side, that count for the middle."""
 
 
 @dataclass(frozen=True)
@@ -102,41 +92,17 @@ def find_line_points(segmentation: Segmentation, view: View, parameters: LinePoi
         return LinePoints(np.empty((0, 2)), np.empty(0, dtype=np.bool_), np.empty((0, 2)), np.empty((0, 2)))
     first, last = int(rows[0]), int(rows[-1]) + 1
     contrast = _contrast(slant, segmentation.brightness, view, parameters)
-    # Where there is no carpet the side is white beyond measure: nothing stands out from it.
-    side = cv2.max(segmentation.whiteness, cv2.compare(segmentation.mask(Colour.GREEN), 0, cv2.CMP_EQ))
     middle = int(np.searchsorted(-slant[first:last], -parameters.near)) + first
-    margin = 12  # [px] runs at the border between the two bands belong to both
-    runs = []  # column and row at which each begins, and its length [px]; those of vertical cuts first
-    for low, high, step in (
-        (first, min(middle + margin, last), parameters.column_step // 2),
-        (max(middle - margin, first), last, parameters.column_step),
-    ):
-        if high - low < 2:
-            continue
-        columns = slice(step // 2, view.lens.width, step)
-        reach = np.minimum(np.rint(across_row[low:high]), LONGEST_REACH).astype(np.intp)
-        place = np.arange(low, high)
-        sides = side[:, columns]
-        higher = cv2.max(sides[np.maximum(place - reach, 0)], sides[np.minimum(place + reach, len(side) - 1)])
-        white = cv2.subtract(segmentation.whiteness[low:high, columns], higher) > contrast[low:high, None]
-        cut, start, length = _runs(white.T, np.broadcast_to(reach, white.T.shape))
-        runs.append((step // 2 + step * cut, start + low, length))
-    vertical = sum(len(length) for _, _, length in runs)
-    steps = np.where(slant[first:last] < parameters.near, parameters.row_step, parameters.row_step // 4)
-    chosen = first + np.flatnonzero((np.arange(first, last) % steps) == 0)
-    reach = np.minimum(np.rint(across_column[chosen]), LONGEST_REACH).astype(np.intp)
-    white = cv2.subtract(segmentation.whiteness[chosen], _higher_side(side[chosen], reach)) > contrast[chosen, None]
-    cut, start, length = _runs(white, np.broadcast_to(reach[:, None], white.shape))
-    runs.append((start, chosen[cut], length))
-    u, v, length = (np.concatenate(each) for each in zip(*runs, strict=True))
-    stride = np.ones(len(u), dtype=np.intp)
-    stride[:vertical] = view.lens.width
-    middles = _middles(segmentation.whiteness.reshape(-1), v * view.lens.width + u, stride, length)
-    pixels = np.stack([u, v], axis=1).astype(np.float64)
-    pixels[:vertical, 1] += middles[:vertical]
-    pixels[vertical:, 0] += middles[vertical:]
-    nearest = np.rint(pixels).astype(np.intp)
-    pixels = pixels[segmentation.on_carpet[nearest[:, 1], nearest[:, 0]] != 0]
+    pixels = cut_lines(
+        segmentation.whiteness,
+        segmentation.classes,
+        segmentation.on_carpet,
+        (first, middle, last),
+        (parameters.column_step, parameters.row_step),
+        np.minimum(np.rint(across_row), LONGEST_REACH).astype(np.intp),
+        np.minimum(np.rint(across_column), LONGEST_REACH).astype(np.intp),
+        contrast,
+    )
     rays = view.lens.rays_inside(pixels)
     ground = view.ground(rays @ view.rotation.T)
     with np.errstate(invalid="ignore"):
@@ -164,76 +130,10 @@ def _expected_widths(view: View, parameters: LinePointParameters) -> tuple[Array
     return SLANTED * deep + MARGIN, SLANTED * wide + MARGIN, slant
 
 
-def _contrast(slant: Array, brightness: float, view: View, parameters: LinePointParameters) -> NDArray[np.uint8]:
+def _contrast(slant: Array, brightness: float, view: View, parameters: LinePointParameters) -> NDArray[np.int32]:
     """Return the contrast asked of a line in each row of the picture."""
     focal = float(view.lens.camera_matrix[1, 1])
     thickness = parameters.line_width * focal * view.height / slant**2  # [px] of a line across the line of sight
     share = np.clip(thickness / 3.0, 0.0, 1.0)  # three pixels thick: the middle keeps the paint's own colour
     asked = parameters.least_contrast + share * (parameters.contrast - parameters.least_contrast)
-    return np.clip(asked * brightness, 9.0, 90.0).astype(np.uint8)
-
-
-def _higher_side(rows: NDArray[np.uint8], reach: NDArray[np.intp]) -> NDArray[np.uint8]:
-    """Return for each pixel of (n, width) rows the higher of the two that are `reach` (n,) to its left and right.
-
-    Beyond the ends of a row its last pixels count. Rows of the same reach must follow each other.
-    """
-    width = rows.shape[1]
-    most = int(reach.max())
-    wider = cv2.copyMakeBorder(rows, 0, 0, most, most, cv2.BORDER_REPLICATE)
-    higher = np.empty_like(rows)
-    borders = [0, *(np.flatnonzero(np.diff(reach)) + 1).tolist(), len(reach)]
-    for first, last in pairwise(borders):
-        left, right = most - int(reach[first]), most + int(reach[first])
-        part = wider[first:last]
-        np.maximum(part[:, left : left + width], part[:, right : right + width], out=higher[first:last])
-    return higher
-
-
-def _runs(
-    white: NDArray[np.bool_], reach: NDArray[np.intp]
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Find the runs of white pixels in each row of an array that are as thick as a line.
-
-    Args:
-        white: (cuts, length).
-        reach: (cuts, length) more than the expected width [px]; runs longer than twice that are no lines.
-
-    Returns:
-        For each run the index of its cut, its first place within that, and its length [px].
-    """
-    cuts, length = white.shape
-    padded = np.zeros((cuts, length + 2), dtype=np.bool_)
-    padded[:, 1:-1] = white
-    # Each row begins and ends without white, so that beginnings and ends of runs take turns.
-    change = np.flatnonzero(padded[:, 1:] != padded[:, :-1])  # in a row of length + 1
-    cut, start = np.divmod(change[0::2], length + 1)
-    long = change[1::2] - change[0::2]
-    expected = reach[cut, start + long // 2]
-    thin = (long <= 2 * expected) & (start >= BESIDE) & (start + long <= length - BESIDE)
-    thin &= long >= SLIMMEST * (expected - MARGIN)  # threads of a net are white too
-    return cut[thin], start[thin], long[thin]
-
-
-def _middles(
-    whiteness: NDArray[np.uint8], start: NDArray[np.intp], stride: NDArray[np.intp], length: NDArray[np.intp]
-) -> Array:
-    """Return (n,) how far the middle of each run is from its first pixel [px].
-
-    Args:
-        whiteness: Of all pixels, row by row.
-        start: (n,) index of each run's first pixel.
-        stride: (n,) from one pixel of the run to the next.
-        length: (n,) [px].
-    """
-    middles = 0.5 * (length - 1)
-    short = np.flatnonzero(length <= LONGEST_SHORT)
-    # Few pixels: the centre of what each has of the paint is exact to a tenth of a pixel.
-    window = np.arange(-BESIDE, LONGEST_SHORT + BESIDE)[:, None]
-    used = window < length[short] + BESIDE  # (window, runs): sums over the first axis are faster
-    index = start[short] + window * stride[short]
-    values = whiteness.take(index, mode="clip")  # clipped: beyond the last line, but not used then
-    floor = np.where(used, values, np.uint8(255)).min(axis=0)
-    weights = np.where(used, values - floor, np.uint8(0)).astype(np.float32)
-    middles[short] = (window[:, 0].astype(np.float32) @ weights) / np.maximum(weights.sum(axis=0), 1e-6)
-    return middles
+    return np.clip(asked * brightness, 9.0, 90.0).astype(np.int32)

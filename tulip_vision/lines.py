@@ -7,15 +7,14 @@ ground are straight and the noise of the points is the same in all directions.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from tulip_vision.features import Feature, FeatureClass
+from tulip_vision.line_growth import grow_lines, local_directions
 from tulip_vision.line_points import LinePoints
 from tulip_vision.view import Array, View, angles, direction_of
 
@@ -120,9 +119,6 @@ class CentreCircle:
 
 ComplexArray = NDArray[np.complex128]
 
-Line = tuple[float, float, float, float]
-"""A straight line in the plane z = 1: x and y of a point on it [px], and its unit direction."""
-
 
 @dataclass(frozen=True)
 class Lines:
@@ -136,7 +132,8 @@ def find_lines(points: LinePoints, view: View, parameters: LineParameters) -> Li
     """Return the straight pieces of line, longest support first, and the centre circle if it is seen."""
     if len(points.flat) < parameters.least_points:
         return Lines((), None)
-    directions, clear = _local_directions(points, parameters.neighbourhood)
+    radius = parameters.neighbourhood
+    directions, clear = local_directions(points.flat, points.near, radius, FAR_NEIGHBOURHOOD * radius)
     circle, on_circle = _find_circle(points, directions, clear, view, parameters)
     flat, directions, clear = points.flat[~on_circle], directions[~on_circle], clear[~on_circle]
     return Lines(tuple(_find_pieces(flat, directions, clear, view, parameters)), circle)
@@ -166,30 +163,6 @@ def line_features(lines: Lines, view: View) -> tuple[Feature, ...]:
             )
         )
     return tuple(features)
-
-
-def _local_directions(points: LinePoints, radius: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Return each point's (n, 2) unit direction from its neighbours, and (n,) whether they lie on a line."""
-    flat = points.flat
-    count = len(flat)
-    one, other = cKDTree(flat, balanced_tree=False).query_pairs(radius, output_type="ndarray").T
-    x, y = flat[:, 0][other] - flat[:, 0][one], flat[:, 1][other] - flat[:, 1][one]
-    # Far away the cuts are closer together, and so are the lines.
-    kept = (points.near[one] & points.near[other]) | (x * x + y * y < (FAR_NEIGHBOURHOOD * radius) ** 2)
-    index = np.flatnonzero(kept)
-    one, other, x, y = one[index], other[index], x[index], y[index]
-    first = np.concatenate([one, other])
-    x, y = np.concatenate([x, -x]), np.concatenate([y, -y])
-    number = np.bincount(first, minlength=count) + 1.0
-    mean_x, mean_y = (np.bincount(first, each, count) / number for each in (x, y))
-    xx = np.bincount(first, x * x, count) / number - mean_x * mean_x
-    yy = np.bincount(first, y * y, count) / number - mean_y * mean_y
-    xy = np.bincount(first, x * y, count) / number - mean_x * mean_y
-    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
-    spread = np.hypot(xx - yy, 2.0 * xy)
-    smaller = 0.5 * (xx + yy - spread)
-    clear = (number >= 4) & (smaller < 0.06 * (xx + yy)) & (smaller < 1.5)
-    return np.column_stack([np.cos(angle), np.sin(angle)]), clear
 
 
 def _find_circle(
@@ -314,84 +287,19 @@ def _find_pieces(
     # Points come cut by cut, so every third one would mean the same line again and again: take them in a scattered
     # order instead (multiplicative hashing), the same one each time.
     candidates = candidates[np.argsort((candidates * 2654435761) % 2**32)][: parameters.hypotheses]
-    least_cosine = math.cos(parameters.alignment)
-    # Homogeneous: a line is (-along_y, along_x, offset), and its product with (x, y, 1) the distance from it. The third
-    # number beside a direction lets points without a direction of their own agree with all lines.
-    places, ways = np.ones((len(flat), 3)), np.empty((len(flat), 3))
-    places[:, :2] = flat
-    ways[:, :2], ways[:, 2] = directions, np.where(clear, 0.0, 9.0)
-    moments = _moments(flat)
-    alive = np.ones(len(flat))
-    support = _supports(places, ways, candidates, parameters)
-    found: list[tuple[NDArray[np.intp], Line]] = []
-    for _ in range(2 * parameters.most):
-        counts = support @ alive.astype(np.float32)
-        best = int(np.argmax(counts))
-        if counts[best] < parameters.least_points or len(found) >= parameters.most:
-            break
-        near = (support[best] > 0.0) & (alive > 0.0)
-        for _ in range(2):
-            x, y, along_x, along_y = line = _line_of(near.astype(np.float64) @ moments)
-            beside = places @ np.array([-along_y, along_x, along_y * x - along_x * y])
-            refined = np.abs(beside, out=beside) < parameters.tolerance
-            refined &= np.abs(ways @ np.array([along_x, along_y, 1.0])) > least_cosine
-            refined &= alive > 0.0
-            if np.count_nonzero(refined) < parameters.least_points:
-                break
-            near = refined
-        members = np.flatnonzero(near)
-        line = _line_of(moments[members].sum(axis=0))
-        run = _longest_run(flat[members], line, view, parameters)
-        if len(run) < len(members):
-            members = members[run]
-            line = _line_of(moments[members].sum(axis=0))
-        alive[members] = 0.0
-        support[best] = 0.0
-        if len(members) >= parameters.least_points:
-            found.append((members, line))
-    return [piece for piece in _pieces(flat, found, view) if piece.length >= parameters.least_length]
-
-
-def _supports(
-    places: Array, ways: Array, candidates: NDArray[np.intp], parameters: LineParameters
-) -> NDArray[np.float32]:
-    """Return (m, n) 1 where a point agrees with the line through a candidate, else 0.
-
-    Args:
-        places: (n, 3) points, homogeneous [px].
-        ways: (n, 3) directions, and whether they agree with all.
-        candidates: (m,) indices of the points that propose lines.
-        parameters: How points are joined.
-    """
-    x, y = places[candidates, 0], places[candidates, 1]
-    along_x, along_y = ways[candidates, 0], ways[candidates, 1]
-    one = np.ones(len(candidates))
-    # Single precision halves the time of the large arrays, and is exact to 1e-4 px.
-    beside = _product(np.stack([-along_y, along_x, along_y * x - along_x * y], axis=1), places)
-    alike = _product(np.stack([along_x, along_y, one], axis=1), ways)
-    agrees = beside < 1.5 * parameters.tolerance
-    agrees &= alike > math.cos(parameters.alignment)
-    return agrees.astype(np.float32)
-
-
-def _product(first: Array, second: Array) -> NDArray[np.float32]:
-    """Return (m, n) absolute scalar products of the rows of (m, 3) and (n, 3)."""
-    product: NDArray[np.float32] = first.astype(np.float32) @ second.astype(np.float32).T
-    return np.abs(product, out=product)
-
-
-def _moments(points: Array) -> Array:
-    """Return (n, 6): 1, x, y and their products xx, xy, yy, of which sums give the best line."""
-    x, y = points.T
-    return np.stack([np.ones(len(points)), x, y, x * x, x * y, y * y], axis=1)
-
-
-def _line_of(sums: Array) -> Line:
-    """Return the line with the least squared distances to points, from the sums of their moments (6,)."""
-    number, x, y, xx, xy, yy = sums.tolist()
-    x, y = x / number, y / number
-    angle = 0.5 * math.atan2(2.0 * (xy / number - x * y), (xx - yy) / number - x * x + y * y)
-    return x, y, math.cos(angle), math.sin(angle)
+    focal = float(view.lens.camera_matrix[0, 0])
+    to_ground = np.stack([*view.rotation.T[:2], focal * view.rotation[:, 2]], axis=1)
+    to_ground[2] /= -view.height
+    members, lengths, lines = grow_lines(
+        flat,
+        directions,
+        clear,
+        candidates,
+        (parameters.tolerance, math.cos(parameters.alignment), parameters.least_points, parameters.most),
+        (parameters.largest_gap_pixels, parameters.largest_gap),
+        to_ground,
+    )
+    return [piece for piece in _pieces(flat[members], lengths, lines, view) if piece.length >= parameters.least_length]
 
 
 def _to_ground(flat: Array, view: View) -> Array:
@@ -399,33 +307,20 @@ def _to_ground(flat: Array, view: View) -> Array:
     return view.ground(flat @ view.rotation[:, :2].T + focal * view.rotation[:, 2])
 
 
-def _longest_run(points: Array, line: Line, view: View, parameters: LineParameters) -> NDArray[np.intp]:
-    """Return the indices of the points of the part without a gap that has most points."""
-    x, y, *along = line
-    place = points @ np.array(along)
-    order = np.argsort(place)
-    place = place[order]
-    gaps = np.flatnonzero(place[1:] - place[:-1] > parameters.largest_gap_pixels)
-    if not len(gaps):
-        return order
-    ends = place[np.concatenate([gaps, gaps + 1]), None] - (x * along[0] + y * along[1])
-    before, after = _complex(_to_ground(np.array([x, y]) + ends * along, view)).reshape(2, -1)
-    parts = np.split(order, gaps[~(np.abs(after - before) <= parameters.largest_gap)] + 1)
-    return max(parts, key=len)
-
-
-def _pieces(flat: Array, found: Sequence[tuple[NDArray[np.intp], Line]], view: View) -> list[LinePiece]:
+def _pieces(points: Array, lengths: NDArray[np.intp], lines: Array, view: View) -> list[LinePiece]:
     """Return the pieces that lines with their points make; those that are bent, or do not lie on the ground, are none.
 
-    All are worked on at once: `piece` says to which of them each point belongs.
+    Args:
+        points: (n, 2), line by line [px].
+        lengths: (m,) how many points each line has.
+        lines: (m, 4) see `Line`.
+        view: Of the picture.
     """
-    if not found:
+    if not len(lines):
         return []
-    lengths = np.array([len(members) for members, _ in found])
-    starts = np.concatenate([[0], np.cumsum(lengths)[:-1]])
-    points = flat[np.concatenate([members for members, _ in found])]
-    x, y, along_x, along_y = np.array([line for _, line in found]).T
-    piece = np.repeat(np.arange(len(found)), lengths)
+    x, y, along_x, along_y = lines.T
+    starts = np.cumsum(lengths) - lengths
+    piece = np.repeat(np.arange(len(lines)), lengths)  # to which line each point belongs
     offset_x, offset_y = points[:, 0] - x[piece], points[:, 1] - y[piece]
     place = offset_x * along_x[piece] + offset_y * along_y[piece]
     across = offset_y * along_x[piece] - offset_x * along_y[piece]

@@ -173,9 +173,7 @@ def _markers(found: list[tuple[NDArray[np.int32], float]], view: View) -> list[_
     high, low = np.maximum.reduceat(elevations, starts).tolist(), np.minimum.reduceat(elevations, starts).tolist()
     middles = (np.add.reduceat(points, starts) / np.array(lengths)[:, None]).tolist()
     areas = [area for _, area in found]
-    return [
-        _Marker(*edges, (u, v)) for *edges, (u, v) in zip(left, right, low, high, areas, middles, strict=True)
-    ]
+    return [_Marker(*edges, (u, v)) for *edges, (u, v) in zip(left, right, low, high, areas, middles, strict=True)]
 
 
 def _examine(

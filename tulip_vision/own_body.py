@@ -40,7 +40,9 @@ class OwnBody:
             for box in link.boxes
             if link.name in places and link.name not in UNSEEN
         ]
-        middles, halves = (np.array(each) for each in zip(*((m, size / 2.0 + MARGIN) for m, size in boxes), strict=True))
+        middles, halves = (
+            np.array(each) for each in zip(*((m, size / 2.0 + MARGIN) for m, size in boxes), strict=True)
+        )
         self._lower, self._upper = middles - halves, middles + halves  # (boxes, 3) in base_link [m]
         signs = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
         self._corners = (middles[:, None] + signs * halves[:, None]).reshape(-1, 3)
