@@ -194,8 +194,8 @@ def _find_circle(
         used &= np.abs((radial * tangent).real) < CIRCLE_ALIGNMENT
         if np.count_nonzero(used) < parameters.circle_points:
             return None, none
-        if wider == 4.0 and np.count_nonzero(_filled(offset[used])) < LEAST_SECTORS // 2:
-            return None, none  # two straight lines at the circle's distance; most pictures end here
+        if wider == 2.0 and np.count_nonzero(_filled(offset[used])) < LEAST_SECTORS - 1:
+            return None, none  # straight lines at the circle's distance; most pictures end here
         step = _gauss_newton(radial[used], error[used])
         if step is None:
             return None, none  # all points in one direction

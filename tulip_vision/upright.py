@@ -16,8 +16,10 @@ from tulip_vision.view import Array, Mask, View, angles, direction_of, direction
 
 MOST_CANDIDATES = 12
 """The largest patches are looked at; a crowd in yellow shirts must not cost time without bound."""
-UNDER = 4
-"""Pixels below an upright's foot at which carpet is looked for; all but one must show it."""
+BELOW, LEAST_BELOW = np.arange(2.0, 6.0), 3
+"""[px] below an upright's foot at which carpet is looked for, and how many must show it."""
+ABOVE, LEAST_ABOVE = np.arange(1.0, 8.0), 2
+"""[px] the same for blue above its upper end."""
 LEAST_SLENDERNESS = 0.6
 """Height over width; one segment of a pole is as high as wide, seen from above a bit less."""
 
@@ -31,6 +33,7 @@ class Upright:
         width: Angle between its left and right edge [rad].
         low, high: Elevation of its lowest and highest point [rad].
         foot_seen: True where carpet is seen right below it.
+        blue_above: True where something blue begins right above it.
         on_carpet: True where its lowest point is inside the carpet's outline or at the lower edge of the picture.
         cut: True where the left or right edge of the picture cuts it.
         reaches_up: True where it goes on to the horizon or the upper edge of the picture.
@@ -43,6 +46,7 @@ class Upright:
     low: float
     high: float
     foot_seen: bool
+    blue_above: bool
     on_carpet: bool
     cut: bool
     reaches_up: bool
@@ -118,14 +122,19 @@ def _measure(contours: list[NDArray[np.int32]], segmentation: Segmentation, view
     azimuths, elevations = angles(view.directions_at(points[:, 0], points[:, 1]))
     parts = [slice(first, last) for first, last in pairwise(starts.tolist())]
     shapes = [_shape(azimuths[part], elevations[part], view) for part in parts]
-    under = np.arange(2.0, 2.0 + UNDER)
-    places = [(shape.azimuth, shape.foot - step * shape.pixel) for shape in shapes for step in under.tolist()]
-    pixels = view.pixels_of_directions(directions_of(*np.array(places).T))
-    (classes, carpet), inside = view.sample_all((segmentation.classes, segmentation.on_carpet), pixels)
-    ground = (belongs(classes, Colour.GREEN | Colour.WHITE) & (carpet != 0) & inside).reshape(-1, UNDER)
+    azimuth, foot, high, pixel = np.array([[each.azimuth, each.foot, each.high, each.pixel] for each in shapes]).T[
+        ..., None
+    ]
+    beside = np.concatenate([foot - BELOW * pixel, high + ABOVE * pixel], axis=1)  # elevations, a row for each
+    places = directions_of(np.repeat(azimuth, beside.shape[1], axis=1).reshape(-1), beside.reshape(-1))
+    read, inside = view.sample_all((segmentation.classes, segmentation.on_carpet), view.pixels_of_directions(places))
+    classes, carpet, inside = (each.reshape(beside.shape) for each in (*read, inside))
+    ground = belongs(classes, Colour.GREEN | Colour.WHITE) & (carpet != 0) & inside
+    fits = np.count_nonzero(ground[:, : len(BELOW)], axis=1) >= LEAST_BELOW
+    blue = np.count_nonzero(belongs(classes[:, len(BELOW) :], Colour.BLUE), axis=1) >= LEAST_ABOVE
     rows, columns = segmentation.classes.shape
     found = []
-    for contour, shape, below in zip(contours, shapes, ground, strict=True):
+    for index, (contour, shape) in enumerate(zip(contours, shapes, strict=True)):
         (lowest_u, lowest_v), top = contour[shape.lowest].tolist(), int(contour[shape.highest, 1])
         left, _, width, _ = cv2.boundingRect(contour)
         found.append(
@@ -134,7 +143,8 @@ def _measure(contours: list[NDArray[np.int32]], segmentation: Segmentation, view
                 width=shape.width,
                 low=shape.foot,
                 high=shape.high,
-                foot_seen=np.count_nonzero(below) >= UNDER - 1,
+                foot_seen=bool(fits[index]),
+                blue_above=bool(blue[index]),
                 on_carpet=bool(lowest_v >= rows - 2 or segmentation.on_carpet[lowest_v, lowest_u] != 0),
                 cut=left <= 0 or left + width >= columns,
                 reaches_up=shape.high > -4.0 * shape.pixel or top <= 1,
