@@ -91,7 +91,7 @@ class _Place:
             bent = np.outer(ARMS, self.second)
             return np.concatenate([straight, -straight, bent, -bent]) + self.point
         offset = self.point - self.centre
-        radius = float(np.linalg.norm(offset))
+        radius = math.hypot(*offset)
         start = math.atan2(float(offset[1]), float(offset[0]))
         turn = start + np.concatenate([ARMS, -ARMS]) / radius
         around = self.centre + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
@@ -130,7 +130,7 @@ def find_crossings(
     features: list[Feature] = []
     refusals: list[Refusal] = []
     for place, shape in zip(places, _shapes(places, segmentation, view, parameters), strict=True):
-        if any(float(np.linalg.norm(place.point - other)) < 0.3 for other in taken):
+        if any(math.hypot(*(place.point - other)) < 0.3 for other in taken):
             continue
         if shape.kind is None:
             pixel = view.pixels_on_ground(place.point[None])[0]
@@ -196,7 +196,7 @@ def _behind(point: Array, opponent: Feature, view: View) -> bool:
     if math.isnan(opponent.elevation):
         return False
     offset = point - view.position[:2]
-    azimuth, distance = math.atan2(float(offset[1]), float(offset[0])), float(np.linalg.norm(offset))
+    azimuth, distance = math.atan2(float(offset[1]), float(offset[0])), math.hypot(*offset)
     apart = abs((azimuth - opponent.azimuth + math.pi) % (2.0 * math.pi) - math.pi)
     body = view.height / math.tan(-opponent.elevation)
     return apart < BODY_HALF_WIDTH / body and distance > body - BODY_HALF_WIDTH
@@ -208,7 +208,7 @@ def _at_foot(point: Array, post: Feature, view: View) -> bool:
         return False
     distance = view.height / math.tan(-post.elevation)
     foot = view.position[:2] + distance * np.array([math.cos(post.azimuth), math.sin(post.azimuth)])
-    return float(np.linalg.norm(point - foot)) < FOOT_RADIUS + 0.05 * distance
+    return math.hypot(*(point - foot)) < FOOT_RADIUS + 0.05 * distance
 
 
 def _proposals(lines: Lines, view: View, parameters: CrossingParameters) -> list[_Place]:
@@ -339,4 +339,4 @@ def _carpet_whiteness(segmentation: Segmentation) -> float:
 def _distance(point: Array, start: Array, end: Array) -> float:
     along = end - start
     share = float(np.clip((point - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0))
-    return float(np.linalg.norm(point - start - share * along))
+    return math.hypot(*(point - start - share * along))

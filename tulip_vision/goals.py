@@ -139,7 +139,7 @@ def _along(
         one side, 0 to 1; 0 if it is out of view.
     """
     heights = np.linspace(0.15, parameters.height - 0.15, 18)
-    ahead = (foot - view.position[:2]) / max(float(np.linalg.norm(foot - view.position[:2])), 1e-6)
+    ahead = (foot - view.position[:2]) / max(math.hypot(*(foot - view.position[:2])), 1e-6)
     across = np.array([-ahead[1], ahead[0]])
     ways = np.cos(TURNS)[:, None] * across + np.sin(TURNS)[:, None] * ahead  # (5, 2)
     reach = np.linspace(0.15, 0.5, 6)[:, None] * parameters.width

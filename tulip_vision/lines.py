@@ -95,7 +95,8 @@ class LinePiece:
     @property
     def length(self) -> float:
         """Distance between the ends [m]."""
-        return float(np.linalg.norm(self.end - self.start))
+        (x0, y0), (x1, y1) = self.start.tolist(), self.end.tolist()
+        return math.hypot(x1 - x0, y1 - y0)
 
     @property
     def direction(self) -> Array:

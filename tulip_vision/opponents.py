@@ -321,7 +321,7 @@ def _contact(
     elevations = np.arange(0.5 * (marker.low + marker.high), bottom, -step)[: int(MOST_DOWN / look[1])]
     if len(elevations) < 4:
         return None  # the marker touches the lower edge of the picture
-    pixels = view.pixels_of_cuts(azimuths, elevations)
+    pixels = view.pixels_of_directions(fan_of(azimuths, elevations))
     images = (segmentation.classes, segmentation.on_carpet, segmentation.own_body)
     (classes, on_carpet, own_body), inside = view.sample_all(images, pixels)
     shape = (len(elevations), len(azimuths))

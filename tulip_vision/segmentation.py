@@ -282,7 +282,9 @@ class Segmenter:
 
     def _brightness(self, picture: Picture) -> float:
         """Return the carpet's value over the reference, from every eighth pixel; 1 if there is hardly any green."""
-        hsv = cv2.cvtColor(picture[::8, ::8], cv2.COLOR_BGR2HSV)
+        height, width = picture.shape[:2]
+        small = cv2.resize(picture, (-(-width // 8), -(-height // 8)), interpolation=cv2.INTER_NEAREST)
+        hsv = cv2.cvtColor(small, cv2.COLOR_BGR2HSV)
         box = self._parameters.colours.green
         # OpenCV keeps hue / 2 in a byte.
         low = (math.ceil(box.hue[0] / 2.0), math.ceil(255.0 * box.saturation[0]), 20)

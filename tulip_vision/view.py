@@ -19,8 +19,6 @@ from tulip_vision.lens import Lens
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
-CUT_STEP = 8
-"""Samples of a cut from one that is projected to the next."""
 HORIZON_STEP = 8
 """[px] width of the blocks that tell on which side of the horizon a row lies."""
 
@@ -170,23 +168,6 @@ class View:
     def pixels_of_directions(self, directions: Array) -> Array:
         """Return (n, 2) pixels at which (n, 3) directions in base_footprint are seen; NaN behind the camera."""
         return self.lens.project(np.asarray(directions, dtype=np.float64) @ self.rotation)
-
-    def pixels_of_cuts(self, azimuths: Array, elevations: Array) -> Array:
-        """Return the same as `pixels_of_directions(fan_of(azimuths, elevations))`, within 0.03 px in the picture.
-
-        Args:
-            azimuths: (m,) of vertical cuts [rad].
-            elevations: (n,) evenly spaced, close to each other: only some are projected, the others are in between.
-        """
-        count = len(elevations)
-        known = min(-(-count // CUT_STEP) + 1, count)
-        places = np.linspace(0.0, count - 1.0, known)
-        nodes = np.linspace(elevations[0], elevations[-1], known)
-        pixels = self.pixels_of_directions(fan_of(azimuths, nodes)).reshape(known, -1)
-        low = np.minimum((np.arange(count) * ((known - 1) / max(count - 1, 1))).astype(np.intp), max(known - 2, 0))
-        share = ((np.arange(count) - places[low]) / max(places[1] if known > 1 else 1.0, 1e-9))[:, None]
-        between: Array = pixels[low] * (1.0 - share) + pixels[np.minimum(low + 1, known - 1)] * share
-        return between.reshape(-1, 2)
 
     def pixels_on_ground(self, points: Array) -> Array:
         """Return (n, 2) pixels of (n, 2) points on the ground, x and y in base_footprint [m]."""
