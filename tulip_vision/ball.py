@@ -69,9 +69,7 @@ def find_ball(segmentation: Segmentation, view: View, parameters: BallParameters
     """Return the most likely ball, if any, and the orange patches that are none."""
     candidates: list[Feature] = []
     refusals: list[Refusal] = []
-    top = view.first_row()  # the camera is higher than the ball
-    mask = segmentation.mask(Colour.ORANGE, top)
-    for points, area in patches(mask, parameters.least_area, MOST_CANDIDATES, (0, top)):
+    for points, area in patches(segmentation.mask(Colour.ORANGE), parameters.least_area, MOST_CANDIDATES):
         result = _examine(points, area, segmentation, view, parameters)
         if isinstance(result, Feature):
             candidates.append(result)
