@@ -259,11 +259,13 @@ def _shapes(
     pixels = view.pixels_on_ground(points.reshape(-1, 2))
     (plain, classes), inside = view.sample_all((segmentation.whiteness, segmentation.classes), pixels)
     values = _brightest(segmentation.whiteness, pixels, inside).reshape(count, -1)[:, : 4 * arm]
-    plain, classes, inside = (each.reshape(count, -1) for each in (plain, classes, inside))
+    plain, classes = (each.reshape(count, -1) for each in (plain, classes))
+    inside = inside.reshape(count, -1)
     on_green = belongs(classes[:, 4 * arm :], Colour.GREEN) & inside[:, 4 * arm :]
     carpet = _medians(plain[:, 4 * arm :], on_green)
     samples = values.reshape(count, 4, arm).astype(np.float64)
-    arm_classes, seen = (each[:, : 4 * arm].reshape(count, 4, arm) for each in (classes, inside))
+    arm_classes = classes[:, : 4 * arm].reshape(count, 4, arm)
+    seen = inside[:, : 4 * arm].reshape(count, 4, arm)
     medians = np.where(seen.all(axis=2), np.median(samples, axis=2), carpet[:, None])
     paint = np.sort(medians, axis=1)[:, -2]  # at least two arms are paint
     contrast = paint - carpet

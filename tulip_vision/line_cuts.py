@@ -127,10 +127,10 @@ def _middle(whiteness: NDArray[np.uint8], v: int, u: int, length: int, down: int
     # Few pixels: the centre of what each has of the paint is exact to a tenth of a pixel.
     floor = 255
     for place in range(-BESIDE, length + BESIDE):
-        floor = min(floor, np.int32(whiteness[v + place * down, u + place * across]))
+        floor = min(floor, int(whiteness[v + place * down, u + place * across]))
     total, moment = 0.0, 0.0
     for place in range(-BESIDE, length + BESIDE):
-        paint = float(np.int32(whiteness[v + place * down, u + place * across]) - floor)
+        paint = float(int(whiteness[v + place * down, u + place * across]) - floor)
         total += paint
         moment += paint * place
     return moment / max(total, 1e-9)

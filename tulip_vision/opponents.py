@@ -172,8 +172,11 @@ def _markers(found: list[tuple[NDArray[np.int32], float]], view: View) -> list[_
     left, right = np.maximum.reduceat(turned, starts).tolist(), np.minimum.reduceat(turned, starts).tolist()
     high, low = np.maximum.reduceat(elevations, starts).tolist(), np.minimum.reduceat(elevations, starts).tolist()
     middles = (np.add.reduceat(points, starts) / np.array(lengths)[:, None]).tolist()
-    areas = [area for _, area in found]
-    return [_Marker(*edges, (u, v)) for *edges, (u, v) in zip(left, right, low, high, areas, middles, strict=True)]
+    columns = zip(left, right, low, high, middles, strict=True)
+    return [
+        _Marker(one_left, one_right, lowest, highest, area, (u, v))
+        for (one_left, one_right, lowest, highest, (u, v)), (_, area) in zip(columns, found, strict=True)
+    ]
 
 
 def _examine(
@@ -257,7 +260,7 @@ def _hides_carpet(marker: _Marker, reach: float, segmentation: Segmentation) -> 
     bare = segmentation.classes[part] & np.uint8(CARPET | Colour.ORANGE | Colour.YELLOW | Colour.BLUE) == 0
     bare &= segmentation.on_carpet[part] != 0
     hidden = cv2.reduce(bare.view(np.uint8), 0, cv2.REDUCE_SUM, dtype=cv2.CV_32S)
-    return np.count_nonzero(hidden >= LEAST_HIDDEN) >= LEAST_HIDDEN
+    return int(np.count_nonzero(hidden >= LEAST_HIDDEN)) >= LEAST_HIDDEN
 
 
 def _without_feet(marker: _Marker, markers: list[_Marker], view: View, parameters: OpponentParameters) -> Feature | str:

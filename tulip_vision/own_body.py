@@ -75,7 +75,7 @@ class OwnBody:
         first, count = STEP * int(rows[0]), view.lens.coarse_ray_table(STEP).shape[0]
         end = view.lens.height if rows[-1] == count - 1 else STEP * (int(rows[-1]) + 1)
         # Pixels beyond the last whole block are like that block: one more is put there, and cut to fit.
-        blocks = np.concatenate([blocks, blocks[:, -1:]], axis=1) * np.uint8(255)
-        blocks = np.concatenate([blocks, blocks[-1:]])
-        whole[first:end] = np.repeat(np.repeat(blocks, STEP, axis=1)[:, : whole.shape[1]], STEP, axis=0)[: end - first]
+        wider = np.concatenate([blocks, blocks[:, -1:]], axis=1).astype(np.uint8) * np.uint8(255)
+        higher = np.concatenate([wider, wider[-1:]])
+        whole[first:end] = np.repeat(np.repeat(higher, STEP, axis=1)[:, : whole.shape[1]], STEP, axis=0)[: end - first]
         return whole

@@ -395,8 +395,7 @@ def _upper_hull(points: Array) -> NDArray[np.intp]:
     """Return the indices of the upper convex hull of (n, 2) points, left to right."""
     whole = cv2.convexHull(points.astype(np.float32), clockwise=False, returnPoints=False).reshape(-1)
     x = points[whole, 0]
-    # OpenCV means a picture, where y grows downwards; here it grows upwards, and so the upper side follows the rightmost
-    # point.
+    # OpenCV means a picture, where y grows downwards; here it grows upwards: the upper side begins at the right.
     first = np.roll(whole, -int(np.argmax(x)))
     count = (int(np.argmin(x)) - int(np.argmax(x))) % len(whole) + 1
     upper: NDArray[np.intp] = first[:count][::-1].astype(np.intp)
