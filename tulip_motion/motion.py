@@ -39,6 +39,7 @@ from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import reach
 from tulip_motion.stabilizer import Balance, SupportArea, stabilize
 from tulip_motion.state_estimator import Estimate, StateEstimator, centre_of_pressure
+from tulip_motion.tilt_filter import TiltFilter
 from tulip_motion.tracking import Order, StepInProgress, Tracking
 from tulip_motion.walking import Walking, must_step
 from tulip_motion.walking_kick import WalkingKick
@@ -80,6 +81,7 @@ class Motion:
         self._shift = (0.0, 0.0)  # [m] of base_link in odom by slips since the feet were last put where they are
         self._falls = FallDetector(p)
         self._area: SupportArea | None = None
+        self._tilt = TiltFilter(p.control_period, p.imu_bias_time, p.imu_bias_limit)
 
     @property
     def mode(self) -> MotionMode:
@@ -169,6 +171,7 @@ class Motion:
         """Return the command for the legs that answers one reading of the sensors."""
         self._stamp = sensors.stamp
         estimate = self._estimate = self._estimator.update(sensors, self._left_weight, self._tracking.com_acceleration)
+        self._tilt.update(sensors, estimate.base_rotation, estimate.soles, estimate.loads, self._left_weight)
         self._track_ground(estimate, sensors)
         if not self._started:
             self._start(estimate)
@@ -194,7 +197,7 @@ class Motion:
         return Odometry(
             self._stamp,
             position,
-            pin.Quaternion(estimate.base_rotation).coeffs(),
+            pin.Quaternion(self._tilt.corrected(estimate.base_rotation)).coeffs(),
             rotation_z(-yaw) @ estimate.base_velocity,
             estimate.base_rotation.T @ estimate.angular_velocity,
             self._dead_reckoning.distance,

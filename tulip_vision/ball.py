@@ -118,7 +118,8 @@ def _examine(
     if not fitting / parameters.size_tolerance - slack <= radius <= fitting * parameters.size_tolerance + slack:
         return f"radius {radius / pixel:.0f} px, {fitting / pixel:.0f} px would fit the place"
 
-    fill = area / _visible_disk_area(view, centre, radius, pixel)
+    disk = math.pi * (radius / pixel) ** 2
+    fill = area / (disk if free.all() else disk * _visible_share(view, centre, radius))
     if fill < parameters.least_fill:
         return f"only {fill:.0%} of the disk is orange"
     around = _cones(centre, [radius + max(0.35 * radius, 2.5 * pixel)], 24)
@@ -171,7 +172,8 @@ def _fit_cone(start: Array, rays: Array, pixel: float) -> tuple[Array, float, fl
         axis = np.asarray(solution / length, dtype=np.float64)
         radius = math.acos(1.0 / length)
         residuals = np.abs(np.arccos(np.clip(rays @ axis, -1.0, 1.0)) - radius)
-        before, near = near, residuals <= max(1.5 * pixel, 2.5 * float(np.median(residuals)))
+        median = float(np.partition(residuals, len(residuals) // 2)[len(residuals) // 2])
+        before, near = near, residuals <= max(1.5 * pixel, 2.5 * median)
         if np.array_equal(before, near):
             break  # the next round would give the same
         kept = rays[near]
@@ -194,9 +196,8 @@ def _cross(first: Array, second: Array) -> Array:
     return np.array([b * z - c * y, c * x - a * z, a * y - b * x])
 
 
-def _visible_disk_area(view: View, axis: Array, radius: float, pixel: float) -> float:
-    """Return the area of the ball's disk that lies inside the picture [px^2]."""
+def _visible_share(view: View, axis: Array, radius: float) -> float:
+    """Return how much of the ball's disk lies inside the picture, 0 to 1."""
     disk = _cones(axis, [radius * share for share in (0.25, 0.56, 0.75, 0.9)], 16)
     inside = view.inside(view.pixels_of_directions(disk), margin=-0.5)
-    share = max(float(inside.mean()), 0.05)
-    return math.pi * (radius / pixel) ** 2 * share
+    return max(float(inside.mean()), 0.05)

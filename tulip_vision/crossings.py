@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import combinations
 
 import cv2
 import numpy as np
@@ -27,6 +28,10 @@ MOST_HIDDEN = 2
 THINGS = Colour.ORANGE | Colour.YELLOW | Colour.BLUE | Colour.DARK
 BETWEEN = np.array([[a * reach, b * reach] for a in (1.0, -1.0) for b in (1.0, -1.0) for reach in (0.14, 0.2)])
 """(8, 2) places between the arms, along both lines [m]."""
+LEAST_BETWEEN = 5
+"""Of them on carpet."""
+LEAST_CONTRAST = 20.0
+"""Between paint and carpet [0-255]."""
 LEAST_MARK_AREA = 8.0
 """[px^2] at 4 m the penalty mark covers about 12."""
 BODY_HALF_WIDTH = 0.25
@@ -80,16 +85,24 @@ class _Place:
     centre: Array | None  # (2,) of the circle [m], where the second line is the circle
 
     def arms(self) -> Array:
-        """Return (4, len(ARMS), 2) points along the four arms [m]."""
-        straight = [self.point + ARMS[:, None] * arm for arm in (self.first, -self.first)]
+        """Return (4 * len(ARMS), 2) points along the four arms [m]."""
+        straight = np.outer(ARMS, self.first)
         if self.centre is None:
-            return np.stack([*straight, *(self.point + ARMS[:, None] * arm for arm in (self.second, -self.second))])
+            bent = np.outer(ARMS, self.second)
+            return np.concatenate([straight, -straight, bent, -bent]) + self.point
         offset = self.point - self.centre
-        radius = float(np.linalg.norm(offset))
+        radius = math.hypot(*offset)
         start = math.atan2(float(offset[1]), float(offset[0]))
-        turns = [start + sign * ARMS / radius for sign in (1.0, -1.0)]
-        bent = [self.centre + radius * np.column_stack([np.cos(turn), np.sin(turn)]) for turn in turns]
-        return np.stack([*straight, *bent])
+        turn = start + np.concatenate([ARMS, -ARMS]) / radius
+        around = self.centre + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        return np.concatenate([straight + self.point, -straight + self.point, around])
+
+
+@dataclass(frozen=True)
+class _Shape:
+    kind: FeatureClass | None
+    confidence: float
+    reason: str  # why it is none
 
 
 def find_crossings(
@@ -113,25 +126,23 @@ def find_crossings(
     places = _proposals(lines, view, parameters)
     if not places:
         return Findings()
-    whiteness = cv2.dilate(segmentation.whiteness, np.ones((3, 3), dtype=np.uint8))
     taken: list[Array] = []
     features: list[Feature] = []
     refusals: list[Refusal] = []
-    for place in places:
-        if any(float(np.linalg.norm(place.point - other)) < 0.3 for other in taken):
+    for place, shape in zip(places, _shapes(places, segmentation, view, parameters), strict=True):
+        if any(math.hypot(*(place.point - other)) < 0.3 for other in taken):
             continue
-        kind, confidence, reason = _shape(place, np.asarray(whiteness), segmentation, view, parameters)
-        if kind is None:
+        if shape.kind is None:
             pixel = view.pixels_on_ground(place.point[None])[0]
             if np.isfinite(pixel).all():
-                refusals.append(Refusal(FeatureClass.CROSSING_L, (float(pixel[0]), float(pixel[1])), reason))
+                refusals.append(Refusal(FeatureClass.CROSSING_L, (float(pixel[0]), float(pixel[1])), shape.reason))
             continue
         if any(_behind(place.point, opponent, view) for opponent in opponents.features):
             continue
         if any(_at_foot(place.point, post, view) for post in goal_posts.features):
             continue
         taken.append(place.point)
-        features.append(_feature(kind, place.point, confidence, view))
+        features.append(_feature(shape.kind, place.point, shape.confidence, view))
     return Findings(tuple(features), tuple(refusals))
 
 
@@ -185,7 +196,7 @@ def _behind(point: Array, opponent: Feature, view: View) -> bool:
     if math.isnan(opponent.elevation):
         return False
     offset = point - view.position[:2]
-    azimuth, distance = math.atan2(float(offset[1]), float(offset[0])), float(np.linalg.norm(offset))
+    azimuth, distance = math.atan2(float(offset[1]), float(offset[0])), math.hypot(*offset)
     apart = abs((azimuth - opponent.azimuth + math.pi) % (2.0 * math.pi) - math.pi)
     body = view.height / math.tan(-opponent.elevation)
     return apart < BODY_HALF_WIDTH / body and distance > body - BODY_HALF_WIDTH
@@ -197,7 +208,7 @@ def _at_foot(point: Array, post: Feature, view: View) -> bool:
         return False
     distance = view.height / math.tan(-post.elevation)
     foot = view.position[:2] + distance * np.array([math.cos(post.azimuth), math.sin(post.azimuth)])
-    return float(np.linalg.norm(point - foot)) < FOOT_RADIUS + 0.05 * distance
+    return math.hypot(*(point - foot)) < FOOT_RADIUS + 0.05 * distance
 
 
 def _proposals(lines: Lines, view: View, parameters: CrossingParameters) -> list[_Place]:
@@ -216,70 +227,102 @@ def _proposals(lines: Lines, view: View, parameters: CrossingParameters) -> list
                 before, after = float((point - piece.start) @ along), float((piece.end - point) @ along)
                 if min(before, after) > -parameters.extension:
                     places.append(_Place(point, along, np.array([-along[1], along[0]]), lines.circle.centre))
-    for index, one in enumerate(pieces):
-        for other in pieces[index + 1 :]:
-            first, second = one.direction, other.direction
-            turn = float(first[0] * second[1] - first[1] * second[0])
-            if abs(turn) < math.cos(parameters.square):
-                continue
-            offset = other.start - one.start
-            along_first = float(offset[0] * second[1] - offset[1] * second[0]) / turn
-            point = one.start + along_first * first
-            along_second = float((point - other.start) @ second)
-            reach = parameters.extension
-            if not (-reach <= along_first <= one.length + reach and -reach <= along_second <= other.length + reach):
-                continue
-            if float(np.linalg.norm(point - view.position[:2])) <= parameters.farthest:
-                places.append(_Place(point, first, second, None))
+    # Plain numbers: numpy is slow one by one.
+    plain = [(*piece.start.tolist(), *piece.direction.tolist(), piece.length) for piece in pieces]
+    eye_x, eye_y = view.position[:2].tolist()
+    least_turn, reach = math.cos(parameters.square), parameters.extension
+    for (index, one), (other_index, other) in combinations(enumerate(plain), 2):
+        (x, y, along_x, along_y, length), (other_x, other_y, across_x, across_y, other_length) = one, other
+        turn = along_x * across_y - along_y * across_x
+        if abs(turn) < least_turn:
+            continue
+        along = ((other_x - x) * across_y - (other_y - y) * across_x) / turn
+        place_x, place_y = x + along * along_x, y + along * along_y
+        across = (place_x - other_x) * across_x + (place_y - other_y) * across_y
+        if not (-reach <= along <= length + reach and -reach <= across <= other_length + reach):
+            continue
+        if math.hypot(place_x - eye_x, place_y - eye_y) <= parameters.farthest:
+            point = np.array([place_x, place_y])
+            places.append(_Place(point, pieces[index].direction, pieces[other_index].direction, None))
     return places
 
 
-def _shape(
-    place: _Place, whiteness: Mask, segmentation: Segmentation, view: View, parameters: CrossingParameters
-) -> tuple[FeatureClass | None, float, str]:
-    """Read the shape of a crossing from the picture: kind or None, confidence, reason of refusal."""
-    along = place.arms().reshape(-1, 2)
-    between = place.point + BETWEEN @ np.stack([place.first, place.second])
-    pixels = view.pixels_on_ground(np.concatenate([along, between]))
-    images = (whiteness, segmentation.whiteness, segmentation.classes)
-    (values, plain_values, classes), inside = view.sample_all(images, pixels)
-    arms = slice(len(along))
-    rest = slice(len(along), None)
-    on_green = belongs(classes[rest], Colour.GREEN) & inside[rest]
-    if np.count_nonzero(on_green) < 5:
-        return None, 0.0, "little carpet between the arms"
-    values, arm_classes, inside = values[arms], classes[arms], inside[arms]
-    carpet = float(np.median(plain_values[rest][on_green]))
-    samples = values.reshape(4, len(ARMS)).astype(np.float64)
-    seen = inside.reshape(4, len(ARMS))
-    medians = np.where(seen.all(axis=1), np.median(samples, axis=1), carpet)
-    paint = float(np.sort(medians)[-2])  # at least two arms are paint
-    if paint - carpet < 20.0:
-        return None, 0.0, "no contrast"
-    is_paint = (samples > 0.5 * (paint + carpet)) & seen
-    green = belongs(arm_classes, Colour.GREEN).reshape(4, len(ARMS)) & seen
-    is_carpet = ~is_paint & green | (samples < carpet + 0.35 * (paint - carpet)) & green
+def _shapes(
+    places: list[_Place], segmentation: Segmentation, view: View, parameters: CrossingParameters
+) -> list[_Shape]:
+    """Read the shapes of crossings from the picture, all at once."""
+    count, arm = len(places), len(ARMS)
+    axes = np.stack([[place.first, place.second] for place in places])  # (places, 2, 2)
+    along = np.stack([place.arms() for place in places])
+    between = np.stack([place.point for place in places])[:, None] + BETWEEN @ axes
+    points = np.concatenate([along, between], axis=1)
+    pixels = view.pixels_on_ground(points.reshape(-1, 2))
+    (plain, classes), inside = view.sample_all((segmentation.whiteness, segmentation.classes), pixels)
+    values = _brightest(segmentation.whiteness, pixels, inside).reshape(count, -1)[:, : 4 * arm]
+    plain, classes = (each.reshape(count, -1) for each in (plain, classes))
+    inside = inside.reshape(count, -1)
+    on_green = belongs(classes[:, 4 * arm :], Colour.GREEN) & inside[:, 4 * arm :]
+    carpet = _medians(plain[:, 4 * arm :], on_green)
+    samples = values.reshape(count, 4, arm).astype(np.float64)
+    arm_classes = classes[:, : 4 * arm].reshape(count, 4, arm)
+    seen = inside[:, : 4 * arm].reshape(count, 4, arm)
+    medians = np.where(seen.all(axis=2), np.median(samples, axis=2), carpet[:, None])
+    paint = np.sort(medians, axis=1)[:, -2]  # at least two arms are paint
+    contrast = paint - carpet
+    is_paint = (samples > 0.5 * (paint + carpet)[:, None, None]) & seen
+    green = belongs(arm_classes, Colour.GREEN) & seen
+    is_carpet = green & (~is_paint | (samples < (carpet + 0.35 * contrast)[:, None, None]))
     # A pole, a foot or the ball may stand on an arm's end: what has their colours says nothing.
-    hidden = belongs(arm_classes, THINGS).reshape(4, len(ARMS)) & ~is_paint & ~is_carpet
-    judged = np.where(hidden.sum(axis=1) <= MOST_HIDDEN, (~hidden).sum(axis=1), len(ARMS))
-    has = is_paint.sum(axis=1) >= parameters.least_arm * judged
-    lacks = is_carpet.sum(axis=1) >= parameters.least_arm * judged
-    if not (has | lacks).all():
-        return None, 0.0, "an arm is hidden or out of the picture"
-    return _kind_of(has, place.centre is not None)
+    hidden = belongs(arm_classes, THINGS) & ~is_paint & ~is_carpet
+    number = hidden.sum(axis=2)
+    judged = np.where(number <= MOST_HIDDEN, arm - number, arm)
+    has = is_paint.sum(axis=2) >= parameters.least_arm * judged
+    lacks = is_carpet.sum(axis=2) >= parameters.least_arm * judged
+    shapes = []
+    for index, place in enumerate(places):
+        if np.count_nonzero(on_green[index]) < LEAST_BETWEEN:
+            shapes.append(_Shape(None, 0.0, "little carpet between the arms"))
+        elif contrast[index] < LEAST_CONTRAST:
+            shapes.append(_Shape(None, 0.0, "no contrast"))
+        elif not (has[index] | lacks[index]).all():
+            shapes.append(_Shape(None, 0.0, "an arm is hidden or out of the picture"))
+        else:
+            shapes.append(_kind_of(has[index], place.centre is not None))
+    return shapes
 
 
-def _kind_of(has: NDArray[np.bool_], circle: bool) -> tuple[FeatureClass | None, float, str]:
+def _brightest(image: Mask, pixels: Array, inside: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Return (n,) the highest value of the nine pixels around each of (n, 2) places; anything outside the picture."""
+    height, width = image.shape
+    u, v = (np.where(inside[:, None], pixels, 0.0) + 0.5).astype(np.intp).T
+    index = np.clip(v, 1, height - 2) * width + np.clip(u, 1, width - 2)
+    steps = np.array([[row * width + column] for row in (-1, 0, 1) for column in (-1, 0, 1)])
+    highest: NDArray[np.uint8] = image.reshape(-1)[index + steps].max(axis=0)
+    return highest
+
+
+def _medians(values: NDArray[np.uint8], used: NDArray[np.bool_]) -> Array:
+    """Return (n,) the median of what is used of each row of (n, m); 0 where nothing is."""
+    number = used.sum(axis=1)
+    ordered = np.sort(np.where(used, values, np.uint8(255)).astype(np.float64), axis=1)
+    row = np.arange(len(values))
+    middles = 0.5 * (
+        ordered[row, np.maximum(number - 1, 0) // 2] + ordered[row, np.minimum(number // 2, values.shape[1] - 1)]
+    )
+    return np.where(number > 0, middles, 0.0)
+
+
+def _kind_of(has: NDArray[np.bool_], circle: bool) -> _Shape:
     count = int(has.sum())
     if count == 4:
-        return FeatureClass.CROSSING_X, 0.9 if circle else 0.7, ""
+        return _Shape(FeatureClass.CROSSING_X, 0.9 if circle else 0.7, "")
     if circle:
-        return None, 0.0, "the circle does not cross here"
+        return _Shape(None, 0.0, "the circle does not cross here")
     if count == 3:
-        return FeatureClass.CROSSING_T, 0.85, ""
+        return _Shape(FeatureClass.CROSSING_T, 0.85, "")
     if count == 2 and has[:2].any() and has[2:].any():
-        return FeatureClass.CROSSING_L, 0.85, ""
-    return None, 0.0, f"{count} arms, no corner"
+        return _Shape(FeatureClass.CROSSING_L, 0.85, "")
+    return _Shape(None, 0.0, f"{count} arms, no corner")
 
 
 def _feature(kind: FeatureClass, point: Array, confidence: float, view: View) -> Feature:
@@ -292,10 +335,10 @@ def _feature(kind: FeatureClass, point: Array, confidence: float, view: View) ->
 
 def _carpet_whiteness(segmentation: Segmentation) -> float:
     sampled = segmentation.whiteness[::8, ::8][belongs(segmentation.classes[::8, ::8], Colour.GREEN)]
-    return float(np.median(sampled)) if sampled.size else 0.0
+    return float(np.partition(sampled, sampled.size // 2)[sampled.size // 2]) if sampled.size else 0.0
 
 
 def _distance(point: Array, start: Array, end: Array) -> float:
     along = end - start
     share = float(np.clip((point - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0))
-    return float(np.linalg.norm(point - start - share * along))
+    return math.hypot(*(point - start - share * along))

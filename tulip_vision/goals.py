@@ -7,12 +7,16 @@ from dataclasses import dataclass
 from math import nan
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
 from tulip_vision.segmentation import Colour, Segmentation, belongs
-from tulip_vision.upright import Upright, axis_samples, find_uprights, foot_on_ground
-from tulip_vision.view import Array, View, direction_of, fan_of
+from tulip_vision.upright import Upright, find_uprights, foot_on_ground
+from tulip_vision.view import Array, View, direction_of
+
+TURNS = np.radians([0.0, -30.0, 30.0, -60.0, 60.0])
+"""Of a crossbar against the line across the line of sight, at which it is looked for."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,9 @@ def find_goal_posts(segmentation: Segmentation, view: View, parameters: GoalPara
     """Return the goal posts: azimuth always, elevation of the foot where it is seen on the carpet."""
     posts: list[Feature] = []
     refusals: list[Refusal] = []
-    uprights = find_uprights(segmentation.mask(Colour.YELLOW), segmentation, view, parameters.least_area)
+    top = view.first_row()
+    yellow = segmentation.mask(Colour.YELLOW, top)
+    uprights = find_uprights(yellow, segmentation, view, parameters.least_area, (0, top))
     # Those with a foot first: a part of the same post higher up must not take its place.
     for upright in sorted(uprights, key=lambda each: (not each.foot_seen, each.low)):
         result = _examine(upright, segmentation, view, parameters)
@@ -76,7 +82,7 @@ def find_goal_posts(segmentation: Segmentation, view: View, parameters: GoalPara
 def _examine(upright: Upright, segmentation: Segmentation, view: View, parameters: GoalParameters) -> Feature | str:
     pixel = upright.pixel_angle
     distance = upright.distance(view)
-    if _blue_above(upright, segmentation, view):
+    if upright.blue_above:
         return "blue above it: a pole"
     if upright.foot_seen and distance <= parameters.farthest:
         foot, elevation = foot_on_ground(view, upright.azimuth, upright.low, parameters.diameter / 2.0)
@@ -86,8 +92,7 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
         smallest = 0.0 if upright.cut else fitting / parameters.width_tolerance - slack
         if not smallest <= upright.width <= fitting * parameters.width_tolerance + slack:
             return f"{upright.width * distance:.2f} m wide"
-        heights = np.linspace(0.15, parameters.height - 0.15, 18)
-        along = axis_samples(view, segmentation.classes, foot, heights)
+        along, bar = _along(segmentation, view, foot, parameters)
         if len(along) < 3:
             return "too little of it in the picture"  # the lowest segment of a pole would look the same
         yellow = float(belongs(along, Colour.YELLOW).mean())
@@ -95,7 +100,6 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
             return f"only {yellow:.0%} of the axis is yellow"
         if float(belongs(along, Colour.BLUE).mean()) > 0.12:
             return "blue above it: a pole"
-        bar = _crossbar(segmentation, view, foot, parameters)
         direction = direction_of(upright.azimuth, elevation)
         azimuth_spread, elevation_spread = view.spreads(direction, 2.0 if upright.cut else 1.0)
         confidence = (0.75 + 0.25 * bar) * min(1.0, yellow / 0.9)
@@ -117,31 +121,38 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
     return Feature(FeatureClass.GOAL_POST, upright.azimuth, nan, azimuth_spread, nan, confidence=0.5)
 
 
-def _blue_above(upright: Upright, segmentation: Segmentation, view: View) -> bool:
-    """Return whether the patch ends below something blue."""
-    elevations = upright.high + upright.pixel_angle * np.arange(1.0, 8.0)
-    above = view.pixels_of_directions(fan_of(upright.azimuth, elevations))
-    classes, _ = view.sample(segmentation.classes, above)
-    return int(np.count_nonzero(belongs(classes, Colour.BLUE))) >= 2
-
-
-def _crossbar(segmentation: Segmentation, view: View, foot: Array, parameters: GoalParameters) -> float:
-    """Return how much of a crossbar leaves the post's upper end on one side, 0 to 1; 0 if it is out of view.
+def _along(
+    segmentation: Segmentation, view: View, foot: Array, parameters: GoalParameters
+) -> tuple[NDArray[np.uint8], float]:
+    """Read the picture along a post and where a crossbar may leave its upper end.
 
     Which way the goal faces is not known: the bar is looked for across the line of sight, within 60 deg.
+
+    Args:
+        segmentation: Of the picture.
+        view: Of the picture.
+        foot: (2,) of the post in base_footprint [m].
+        parameters: How a goal looks.
+
+    Returns:
+        (n,) classes along the part of the post's axis that is in the picture; and how much of a crossbar there is on
+        one side, 0 to 1; 0 if it is out of view.
     """
-    ahead = (foot - view.position[:2]) / max(float(np.linalg.norm(foot - view.position[:2])), 1e-6)
+    heights = np.linspace(0.15, parameters.height - 0.15, 18)
+    ahead = (foot - view.position[:2]) / max(math.hypot(*(foot - view.position[:2])), 1e-6)
     across = np.array([-ahead[1], ahead[0]])
-    turns = np.radians([0.0, -30.0, 30.0, -60.0, 60.0])
-    ways = np.cos(turns)[:, None] * across + np.sin(turns)[:, None] * ahead
-    ways = np.concatenate([ways, -ways])
-    reach = np.linspace(0.15, 0.5, 6) * parameters.width
-    places = foot + ways[:, None, :] * reach[:, None]
-    points = np.concatenate([places, np.full((*places.shape[:2], 1), parameters.height)], axis=2)
-    values, inside = view.sample(segmentation.classes, view.pixels(points.reshape(-1, 3)))
-    yellow = belongs(values, Colour.YELLOW).reshape(len(ways), len(reach))
-    seen = inside.reshape(yellow.shape).sum(axis=1)
-    return float(np.where(seen >= 3, yellow.sum(axis=1) / np.maximum(seen, 1), 0.0).max())
+    ways = np.cos(TURNS)[:, None] * across + np.sin(TURNS)[:, None] * ahead  # (5, 2)
+    reach = np.linspace(0.15, 0.5, 6)[:, None] * parameters.width
+    points = np.empty((len(heights) + 2 * len(ways) * len(reach), 3))
+    points[: len(heights), :2], points[: len(heights), 2] = foot, heights
+    bars = ways[:, None] * reach  # (5, 6, 2)
+    points[len(heights) :, :2] = foot + np.concatenate([bars, -bars]).reshape(-1, 2)
+    points[len(heights) :, 2] = parameters.height
+    classes, inside = view.sample(segmentation.classes, view.pixels(points))
+    along: NDArray[np.uint8] = classes[: len(heights)][inside[: len(heights)]]
+    yellow = belongs(classes[len(heights) :], Colour.YELLOW).reshape(-1, len(reach)).sum(axis=1)
+    seen = inside[len(heights) :].reshape(-1, len(reach)).sum(axis=1)
+    return along, float(np.where(seen >= 3, yellow / np.maximum(seen, 1), 0.0).max())
 
 
 def _angle(first: float, second: float) -> float:

@@ -143,13 +143,13 @@ class Lens:
 
         Between the table's pixels rays are interpolated, which errs by less than a thousandth of a pixel.
         """
-        table = self._ray_table
         low = np.minimum(pixels.astype(np.intp), (self.width - 2, self.height - 2))
-        (u, v), (right, down) = low.T, (pixels - low).T[:, :, None]
-        upper = table[v, u] * (1.0 - right) + table[v, u + 1] * right
-        lower = table[v + 1, u] * (1.0 - right) + table[v + 1, u + 1] * right
-        rays = upper * (1.0 - down) + lower * down
-        unit: Array = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        (right, down), (u, v) = (pixels - low).T[..., None], low.T
+        upper_left = v * self.width + u
+        table = self._ray_table.reshape(-1, 3)
+        one, two, three, four = (table.take(upper_left + step, axis=0) for step in (0, 1, self.width, self.width + 1))
+        rays = (one * (1.0 - right) + two * right) * (1.0 - down) + (three * (1.0 - right) + four * right) * down
+        unit: Array = rays / np.sqrt(np.einsum("ij,ij->i", rays, rays))[:, None]
         return unit
 
     def ray_table(self) -> NDArray[np.float32]:
@@ -241,16 +241,19 @@ class Lens:
         return math.tan(self.largest_angle + 1e-12) if self.largest_angle < math.radians(89.0) else None
 
     @cached_property
+    def _pixel_scale(self) -> tuple[Array, Array]:
+        """Focal lengths (fx, fy) and middle (cx, cy) [px]."""
+        return self.camera_matrix[[0, 1], [0, 1]], self.camera_matrix[:2, 2]
+
+    @cached_property
     def _least_cosine(self) -> float:
         # Rounding must not cost the last direction, which projects where `rays` came from.
         return math.cos(self.largest_angle) - 1e-12
 
     def _to_pixels(self, points: Array) -> Array:
         """Return (n, 2) pixels of (n, 2) points of the image plane at distance 1."""
-        (fx, _, cx), (_, fy, cy), _ = self.camera_matrix.tolist()
-        pixels = np.empty(points.shape)
-        pixels[:, 0] = fx * points[:, 0] + cx
-        pixels[:, 1] = fy * points[:, 1] + cy
+        focal_lengths, middle = self._pixel_scale
+        pixels: Array = points * focal_lengths + middle
         return pixels
 
 

@@ -115,7 +115,8 @@ class PlumbBob:
 
     def _stretch(self, squared: Array) -> Array:
         """Return (n,) by how much the distance from the optical axis grows, given its square at z = 1."""
-        stretch: Array = 1.0 + squared * (self._k1 + squared * (self._k2 + squared * self._k3))
+        outer = self._k2 + squared * self._k3 if self._k3 else self._k2
+        stretch: Array = 1.0 + squared * (self._k1 + squared * outer)
         if self._k4 or self._k5 or self._k6:
             stretch = stretch / (1.0 + squared * (self._k4 + squared * (self._k5 + squared * self._k6)))
         return stretch

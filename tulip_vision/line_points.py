@@ -9,23 +9,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tulip_vision.segmentation import Colour, Segmentation
+from tulip_vision.line_cuts import MARGIN, cut_lines
+from tulip_vision.segmentation import Segmentation
 from tulip_vision.view import Array, View
 
 LONGEST_REACH = 60
 """[px] lines at the robot's own feet are not looked for beyond that."""
 SLANTED = 1.6
 """Thickness of a line that runs at up to 50 deg to its cut, over that of one at a right angle."""
-MARGIN = 2.0
-"""[px] blur on both sides."""
-SLIMMEST = 0.4
-"""Least thickness of a line over the largest: two thirds of what is expected at a right angle."""
 
 
 @dataclass(frozen=True)
@@ -97,36 +92,17 @@ def find_line_points(segmentation: Segmentation, view: View, parameters: LinePoi
         return LinePoints(np.empty((0, 2)), np.empty(0, dtype=np.bool_), np.empty((0, 2)), np.empty((0, 2)))
     first, last = int(rows[0]), int(rows[-1]) + 1
     contrast = _contrast(slant, segmentation.brightness, view, parameters)
-    # Where there is no carpet the side is white beyond measure: nothing stands out from it.
-    side = cv2.max(segmentation.whiteness, cv2.compare(segmentation.mask(Colour.GREEN), 0, cv2.CMP_EQ))
-    found = []
     middle = int(np.searchsorted(-slant[first:last], -parameters.near)) + first
-    margin = 12  # [px] runs at the border between the two bands belong to both
-    for low, high, step in (
-        (first, min(middle + margin, last), parameters.column_step // 2),
-        (max(middle - margin, first), last, parameters.column_step),
-    ):
-        if high - low < 2:
-            continue
-        columns = slice(step // 2, view.lens.width, step)
-        reach = np.minimum(np.rint(across_row[low:high]), LONGEST_REACH).astype(np.intp)
-        place = np.arange(low, high)
-        sides = side[:, columns]
-        higher = cv2.max(sides[np.maximum(place - reach, 0)], sides[np.minimum(place + reach, len(side) - 1)])
-        own = segmentation.whiteness[low:high, columns]
-        white = cv2.subtract(own, higher) > contrast[low:high, None]
-        cut, where = _runs(white.T, own.T, np.broadcast_to(reach, white.T.shape))
-        found.append(np.column_stack([step // 2 + step * cut, where + low]))
-    steps = np.where(slant[first:last] < parameters.near, parameters.row_step, parameters.row_step // 4)
-    chosen = first + np.flatnonzero((np.arange(first, last) % steps) == 0)
-    reach = np.minimum(np.rint(across_column[chosen]), LONGEST_REACH).astype(np.intp)
-    own = segmentation.whiteness[chosen]
-    white = cv2.subtract(own, _higher_side(side[chosen], reach)) > contrast[chosen, None]
-    cut, where = _runs(white, own, np.broadcast_to(reach[:, None], white.shape))
-    found.append(np.column_stack([where, chosen[cut]]))
-    pixels = np.concatenate(found)
-    nearest = np.rint(pixels).astype(np.intp)
-    pixels = pixels[segmentation.on_carpet[nearest[:, 1], nearest[:, 0]] != 0]
+    pixels = cut_lines(
+        segmentation.whiteness,
+        segmentation.classes,
+        segmentation.on_carpet,
+        (first, middle, last),
+        (parameters.column_step, parameters.row_step),
+        np.minimum(np.rint(across_row), LONGEST_REACH).astype(np.intp),
+        np.minimum(np.rint(across_column), LONGEST_REACH).astype(np.intp),
+        contrast,
+    )
     rays = view.lens.rays_inside(pixels)
     ground = view.ground(rays @ view.rotation.T)
     with np.errstate(invalid="ignore"):
@@ -154,65 +130,10 @@ def _expected_widths(view: View, parameters: LinePointParameters) -> tuple[Array
     return SLANTED * deep + MARGIN, SLANTED * wide + MARGIN, slant
 
 
-def _contrast(slant: Array, brightness: float, view: View, parameters: LinePointParameters) -> NDArray[np.uint8]:
+def _contrast(slant: Array, brightness: float, view: View, parameters: LinePointParameters) -> NDArray[np.int32]:
     """Return the contrast asked of a line in each row of the picture."""
     focal = float(view.lens.camera_matrix[1, 1])
     thickness = parameters.line_width * focal * view.height / slant**2  # [px] of a line across the line of sight
     share = np.clip(thickness / 3.0, 0.0, 1.0)  # three pixels thick: the middle keeps the paint's own colour
     asked = parameters.least_contrast + share * (parameters.contrast - parameters.least_contrast)
-    return np.clip(asked * brightness, 9.0, 90.0).astype(np.uint8)
-
-
-def _higher_side(rows: NDArray[np.uint8], reach: NDArray[np.intp]) -> NDArray[np.uint8]:
-    """Return for each pixel of (n, width) rows the higher of the two that are `reach` (n,) to its left and right.
-
-    Beyond the ends of a row its last pixels count. Rows of the same reach must follow each other.
-    """
-    width = rows.shape[1]
-    most = int(reach.max())
-    wider = cv2.copyMakeBorder(rows, 0, 0, most, most, cv2.BORDER_REPLICATE)
-    higher = np.empty_like(rows)
-    borders = [0, *(np.flatnonzero(np.diff(reach)) + 1).tolist(), len(reach)]
-    for first, last in pairwise(borders):
-        left, right = most - int(reach[first]), most + int(reach[first])
-        part = wider[first:last]
-        np.maximum(part[:, left : left + width], part[:, right : right + width], out=higher[first:last])
-    return higher
-
-
-def _runs(
-    white: NDArray[np.bool_], whiteness: NDArray[np.uint8], reach: NDArray[np.intp]
-) -> tuple[NDArray[np.intp], Array]:
-    """Find the runs of white pixels in each row of an array, and their middles.
-
-    Args:
-        white: (cuts, length).
-        whiteness: (cuts, length) 0 to 255.
-        reach: (cuts, length) more than the expected width [px]; runs longer than twice that are no lines.
-
-    Returns:
-        (n,) index of the cut, and (n,) place of the run's middle within it [px].
-    """
-    cuts, length = white.shape
-    padded = np.zeros((cuts, length + 2), dtype=np.bool_)
-    padded[:, 1:-1] = white
-    # Each row begins and ends without white, so that beginnings and ends of runs take turns.
-    change = np.flatnonzero(padded[:, 1:] != padded[:, :-1])  # in a row of length + 1
-    start, end = change[0::2], change[1::2]
-    cut = start // (length + 1)
-    start, end = start % (length + 1), end % (length + 1)
-    expected = reach[cut, (start + end) // 2]
-    thin = (end - start <= 2 * expected) & (start > 0) & (end < length)
-    thin &= end - start >= SLIMMEST * (expected - MARGIN)  # threads of a net are white too
-    cut, start, end = cut[thin], start[thin], end[thin]
-    middle = 0.5 * (start + end - 1)
-    short = np.flatnonzero(end - start <= 10)
-    if len(short):
-        # Few pixels: the centre of what each has of the paint is exact to a tenth of a pixel.
-        window = start[short, None] - 2 + np.arange(14)
-        used = (window >= 0) & (window < length) & (window < end[short, None] + 2)
-        values = whiteness[cut[short, None], np.clip(window, 0, length - 1)].astype(np.float64)
-        floor = np.where(used, values, np.inf).min(axis=1, keepdims=True)
-        weights = np.where(used, values - floor, 0.0)
-        middle[short] = (weights * window).sum(axis=1) / np.maximum(weights.sum(axis=1), 1e-9)
-    return cut, middle
+    return np.clip(asked * brightness, 9.0, 90.0).astype(np.int32)

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from tulip_vision.features import Feature, FeatureClass
+from tulip_vision.line_growth import grow_lines, local_directions
 from tulip_vision.line_points import LinePoints
 from tulip_vision.view import Array, View, angles, direction_of
 
@@ -22,6 +22,8 @@ FAR_NEIGHBOURHOOD = 0.65
 """Neighbourhood of far points over that of near ones."""
 CIRCLE_ALIGNMENT = math.sin(math.radians(25.0))
 """Largest deviation of a point's own direction from the circle's."""
+VOTE_CELL = 0.15
+"""[m] a quarter of a right angle's direction error at the radius."""
 SECTORS = 24
 LEAST_SECTORS = 7
 """Of 24 sectors of 15 deg: less arc than that cannot be told from two straight pieces that meet."""
@@ -57,7 +59,7 @@ class LineParameters:
     least_points: int = 8
     least_length: float = 0.30  # [m]
     most: int = 16
-    hypotheses: int = 220
+    hypotheses: int = 160
     circle_radius: float = 0.75
     circle_tolerance: float = 0.02  # [m] unevenly painted
     circle_tolerance_pixels: float = 1.0  # [px] counted in depth, where a pixel covers most
@@ -93,7 +95,8 @@ class LinePiece:
     @property
     def length(self) -> float:
         """Distance between the ends [m]."""
-        return float(np.linalg.norm(self.end - self.start))
+        (x0, y0), (x1, y1) = self.start.tolist(), self.end.tolist()
+        return math.hypot(x1 - x0, y1 - y0)
 
     @property
     def direction(self) -> Array:
@@ -115,6 +118,9 @@ class CentreCircle:
     points: int
 
 
+ComplexArray = NDArray[np.complex128]
+
+
 @dataclass(frozen=True)
 class Lines:
     """What the line points were joined to."""
@@ -127,7 +133,8 @@ def find_lines(points: LinePoints, view: View, parameters: LineParameters) -> Li
     """Return the straight pieces of line, longest support first, and the centre circle if it is seen."""
     if len(points.flat) < parameters.least_points:
         return Lines((), None)
-    directions, clear = _local_directions(points, parameters.neighbourhood)
+    radius = parameters.neighbourhood
+    directions, clear = local_directions(points.flat, points.near, radius, FAR_NEIGHBOURHOOD * radius)
     circle, on_circle = _find_circle(points, directions, clear, view, parameters)
     flat, directions, clear = points.flat[~on_circle], directions[~on_circle], clear[~on_circle]
     return Lines(tuple(_find_pieces(flat, directions, clear, view, parameters)), circle)
@@ -159,94 +166,114 @@ def line_features(lines: Lines, view: View) -> tuple[Feature, ...]:
     return tuple(features)
 
 
-def _local_directions(points: LinePoints, radius: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Return each point's (n, 2) unit direction from its neighbours, and (n,) whether they lie on a line."""
-    flat = points.flat
-    count = len(flat)
-    one, other = cKDTree(flat, balanced_tree=False).query_pairs(radius, output_type="ndarray").T
-    x, y = flat[:, 0][other] - flat[:, 0][one], flat[:, 1][other] - flat[:, 1][one]
-    # Far away the cuts are closer together, and so are the lines.
-    kept = (points.near[one] & points.near[other]) | (x * x + y * y < (FAR_NEIGHBOURHOOD * radius) ** 2)
-    one, other, x, y = one[kept], other[kept], x[kept], y[kept]
-    first = np.concatenate([one, other])
-    x, y = np.concatenate([x, -x]), np.concatenate([y, -y])
-    number = np.bincount(first, minlength=count) + 1.0
-    mean_x, mean_y = (np.bincount(first, each, count) / number for each in (x, y))
-    xx = np.bincount(first, x * x, count) / number - mean_x**2
-    yy = np.bincount(first, y * y, count) / number - mean_y**2
-    xy = np.bincount(first, x * y, count) / number - mean_x * mean_y
-    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
-    spread = np.hypot(xx - yy, 2.0 * xy)
-    smaller = 0.5 * (xx + yy - spread)
-    clear = (number >= 4) & (smaller < 0.06 * (xx + yy)) & (smaller < 1.5)
-    return np.column_stack([np.cos(angle), np.sin(angle)]), clear
-
-
 def _find_circle(
     points: LinePoints, directions: Array, clear: NDArray[np.bool_], view: View, parameters: LineParameters
 ) -> tuple[CentreCircle | None, NDArray[np.bool_]]:
-    """Find the centre circle: every point votes for the two centres that its direction allows."""
+    """Find the centre circle: every point votes for the two centres that its direction allows.
+
+    Points of the ground are complex numbers here, x + iy: half as many operations.
+    """
     none = np.zeros(len(points.flat), dtype=np.bool_)
-    near = np.hypot(*(points.ground - view.position[:2]).T) < parameters.circle_range
-    chosen = np.flatnonzero(clear & near)
+    everywhere, eye = _complex(points.ground), complex(*view.position[:2])
+    chosen = np.flatnonzero(clear & (np.abs(everywhere - eye) < parameters.circle_range))
     if len(chosen) < parameters.circle_points:
         return None, none
-    tangent = _to_ground(points.flat[chosen] + 2.0 * directions[chosen], view) - points.ground[chosen]
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
-    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
-    ground = points.ground[chosen]
-    votes = np.concatenate([ground + parameters.circle_radius * normal, ground - parameters.circle_radius * normal])
-    votes = votes[np.isfinite(votes).all(axis=1)]
-    cell = 0.15  # [m] a quarter of a right angle's direction error at the radius
-    index = np.floor((votes - votes.min(axis=0)) / cell).astype(np.intp)
-    shape = index.max(axis=0) + 1
-    if shape.prod() > 100_000:
+    ground = everywhere[chosen]
+    tangent = _complex(_to_ground(points.flat[chosen] + 2.0 * directions[chosen], view)) - ground
+    tangent /= np.maximum(np.abs(tangent), 1e-9)
+    centre = _elect(ground, 1j * parameters.circle_radius * tangent)
+    if centre is None:
         return None, none
-    counts = np.bincount(index[:, 0] * shape[1] + index[:, 1], minlength=int(shape.prod())).reshape(shape)
-    summed = cv2.boxFilter(counts.astype(np.float32), -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
-    peak = np.unravel_index(int(np.argmax(summed)), summed.shape)
-    centre = votes.min(axis=0) + (np.array(peak) + 0.5) * cell
-    tolerance = _circle_tolerance(ground, view, parameters)
+    tolerance = _circle_tolerance(np.abs(ground - eye), view, parameters)
+    tangent = tangent.conj()
     for wider in (4.0, 3.0, 2.0, 1.0, 1.0):
         offset = ground - centre
-        distance = np.maximum(np.linalg.norm(offset, axis=1), 1e-6)
-        radial = offset / distance[:, None]
+        distance = np.maximum(np.abs(offset), 1e-6)
+        radial = offset / distance
         error = distance - parameters.circle_radius
-        along = np.abs((radial * tangent).sum(axis=1)) < CIRCLE_ALIGNMENT
-        used = (np.abs(error) < np.minimum(wider * tolerance, 0.2)) & along
+        used = np.abs(error) < np.minimum(wider * tolerance, 0.2)
+        used &= np.abs((radial * tangent).real) < CIRCLE_ALIGNMENT
         if np.count_nonzero(used) < parameters.circle_points:
             return None, none
-        # Gauss-Newton: the residual falls by radial . step when the centre moves by step.
-        away = radial[used]
-        try:
-            centre = centre + np.linalg.solve(away.T @ away, away.T @ error[used])
-        except np.linalg.LinAlgError:
+        if wider == 2.0 and np.count_nonzero(_filled(offset[used])) < LEAST_SECTORS - 1:
+            return None, none  # straight lines at the circle's distance; most pictures end here
+        step = _gauss_newton(radial[used], error[used])
+        if step is None:
             return None, none  # all points in one direction
+        centre += step
     if not _is_whole(centre, offset[used], view, parameters):
         return None, none
     on_circle = none.copy()
     on_circle[chosen[used]] = True
-    error = np.abs(np.linalg.norm(points.ground - centre, axis=1) - parameters.circle_radius)
-    on_circle |= ~clear & (error < _circle_tolerance(points.ground, view, parameters))
-    return CentreCircle(centre, int(np.count_nonzero(used))), on_circle
+    error = np.abs(np.abs(everywhere - centre) - parameters.circle_radius)
+    on_circle |= ~clear & (error < _circle_tolerance(np.abs(everywhere - eye), view, parameters))
+    return CentreCircle(np.array([centre.real, centre.imag]), int(np.count_nonzero(used))), on_circle
 
 
-def _is_whole(centre: Array, offset: Array, view: View, parameters: LineParameters) -> bool:
-    """Return whether points, (n, 2) from the circle's centre [m], fill enough of the part that the picture shows."""
-    sector = np.floor(np.arctan2(offset[:, 1], offset[:, 0]) * SECTORS / (2.0 * math.pi)).astype(np.intp) % SECTORS
-    filled = np.bincount(sector, minlength=SECTORS) >= 2
-    middle = (np.arange(SECTORS) + 0.5) * 2.0 * math.pi / SECTORS
-    around = centre + parameters.circle_radius * np.column_stack([np.cos(middle), np.sin(middle)])
-    shown = view.inside(view.pixels_on_ground(around), margin=10.0)
-    shown &= np.hypot(*(around - view.position[:2]).T) < parameters.circle_range
+def _complex(points: Array) -> ComplexArray:
+    """Return (n,) x + iy of (n, 2) points."""
+    return np.ascontiguousarray(points).view(np.complex128)[:, 0]
+
+
+def _elect(ground: ComplexArray, inwards: ComplexArray) -> complex | None:
+    """Return the centre with most votes; None if the votes are all over the place.
+
+    Args:
+        ground: (n,) points [m].
+        inwards: (n,) from each to the centre that it votes for, if not to the one on the other side.
+    """
+    votes = np.concatenate([ground + inwards, ground - inwards]).view(np.float64).reshape(-1, 2)
+    votes = votes[np.isfinite(votes).all(axis=1)]
+    corner = votes.min(axis=0)
+    index = ((votes - corner) / VOTE_CELL).astype(np.intp)
+    rows, columns = (index.max(axis=0) + 1).tolist()
+    if rows * columns > 100_000:
+        return None
+    counts = np.bincount(index[:, 0] * columns + index[:, 1], minlength=rows * columns).reshape(rows, columns)
+    summed = cv2.boxFilter(counts.astype(np.float32), -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
+    row, column = divmod(int(np.argmax(summed)), columns)
+    return complex(corner[0] + (row + 0.5) * VOTE_CELL, corner[1] + (column + 0.5) * VOTE_CELL)
+
+
+def _gauss_newton(radial: ComplexArray, error: Array) -> complex | None:
+    """Return by how much to move a centre: each residual falls by radial . step; None if that is not determined."""
+    x, y = radial.real, radial.imag
+    xx, xy, yy, ex, ey = float(x @ x), float(x @ y), float(y @ y), float(x @ error), float(y @ error)
+    determinant = xx * yy - xy * xy
+    if determinant <= 1e-9 * xx * yy:
+        return None
+    return complex(yy * ex - xy * ey, xx * ey - xy * ex) / determinant
+
+
+def _filled(offset: ComplexArray) -> NDArray[np.bool_]:
+    """Return (SECTORS,) which of the circle's sectors hold points, (n,) from its centre."""
+    sector = np.floor(np.angle(offset) * (SECTORS / (2.0 * math.pi))).astype(np.intp) % SECTORS
+    filled: NDArray[np.bool_] = np.bincount(sector, minlength=SECTORS) >= 2
+    return filled
+
+
+def _is_whole(centre: complex, offset: ComplexArray, view: View, parameters: LineParameters) -> bool:
+    """Return whether points, (n,) from the circle's centre [m], fill enough of the part that the picture shows."""
+    filled = _filled(offset)
     count = np.count_nonzero(filled)
-    return bool(count >= LEAST_SECTORS and np.count_nonzero(filled & shown) >= LEAST_SHARE * np.count_nonzero(shown))
+    if count < LEAST_SECTORS:
+        return False
+    around = centre + parameters.circle_radius * np.exp((np.arange(SECTORS) + 0.5) * (2j * math.pi / SECTORS))
+    places = around.view(np.float64).reshape(-1, 2)
+    shown = view.inside(view.pixels_on_ground(places), margin=10.0)
+    shown &= np.hypot(*(places - view.position[:2]).T) < parameters.circle_range
+    return bool(np.count_nonzero(filled & shown) >= LEAST_SHARE * np.count_nonzero(shown))
 
 
-def _circle_tolerance(ground: Array, view: View, parameters: LineParameters) -> Array:
-    """Return (n,) how far each point may be from the circle [m]: paint, and the depth that a pixel covers there."""
-    slant_squared = ((ground - view.position[:2]) ** 2).sum(axis=1) + view.height**2
-    depth = slant_squared / (view.height * float(view.lens.camera_matrix[1, 1]))
+def _circle_tolerance(distance: Array, view: View, parameters: LineParameters) -> Array:
+    """Return (n,) how far points may be from the circle [m]: paint, and the depth that a pixel covers there.
+
+    Args:
+        distance: (n,) of the points along the ground [m].
+        view: Of the picture.
+        parameters: How a circle is found.
+    """
+    depth = (distance * distance + view.height**2) / (view.height * float(view.lens.camera_matrix[1, 1]))
     tolerance: Array = parameters.circle_tolerance + parameters.circle_tolerance_pixels * depth
     return tolerance
 
@@ -261,61 +288,19 @@ def _find_pieces(
     # Points come cut by cut, so every third one would mean the same line again and again: take them in a scattered
     # order instead (multiplicative hashing), the same one each time.
     candidates = candidates[np.argsort((candidates * 2654435761) % 2**32)][: parameters.hypotheses]
-    tried = directions[candidates]
-    distances = flat[candidates, 0] * tried[:, 1] - flat[candidates, 1] * tried[:, 0]
-    least_cosine = math.cos(parameters.alignment)
-    # Single precision halves the time of the large arrays, and is exact to 1e-4 px. The third column takes away each
-    # line's distance from the middle, and lets points without a direction of their own agree with all lines.
-    one, agreeing = np.ones(len(flat)), np.where(clear, 0.0, 9.0)
-    beside = _product(np.column_stack([tried[:, 1], -tried[:, 0], -distances]), np.column_stack([flat, one]))
-    alike = _product(np.column_stack([tried, one[candidates]]), np.column_stack([directions, agreeing]))
-    support = ((beside < 1.5 * parameters.tolerance) & (alike > least_cosine)).astype(np.float32)
-    alive = np.ones(len(flat), dtype=np.float32)
-    pieces: list[LinePiece] = []
-    for _ in range(2 * parameters.most):
-        counts = support @ alive
-        best = int(np.argmax(counts))
-        if counts[best] < parameters.least_points or len(pieces) >= parameters.most:
-            break
-        members = np.flatnonzero((support[best] > 0.0) & (alive > 0.0))
-        for _ in range(2):
-            centre, along = _fit(flat[members])
-            offset = flat - centre
-            near = np.abs(offset @ np.array([-along[1], along[0]])) < parameters.tolerance
-            near &= (np.abs(directions @ along) > least_cosine) | ~clear
-            refined = np.flatnonzero(near & (alive > 0.0))
-            if len(refined) < parameters.least_points:
-                break
-            members = refined
-        points = flat[members]
-        line = _fit(points)
-        run = _longest_run(points, line, view, parameters)
-        if len(run) < len(members):
-            members = members[run]
-            points = flat[members]
-            line = _fit(points)
-        alive[members] = 0.0
-        support[best] = 0.0
-        if len(members) >= parameters.least_points:
-            piece = _piece(points, line, view)
-            if piece is not None and piece.length >= parameters.least_length:
-                pieces.append(piece)
-    return pieces
-
-
-def _product(first: Array, second: Array) -> NDArray[np.float32]:
-    """Return (m, n) absolute scalar products of the rows of (m, 3) and (n, 3)."""
-    product: NDArray[np.float32] = first.astype(np.float32) @ second.astype(np.float32).T
-    return np.abs(product, out=product)
-
-
-def _fit(points: Array) -> tuple[Array, Array]:
-    """Return the centre (2,) and unit direction (2,) of the line with the least squared distances to points."""
-    centre = points.sum(axis=0) / len(points)
-    offset = points - centre
-    (xx, xy), (_, yy) = (offset.T @ offset).tolist()
-    angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
-    return centre, np.array([math.cos(angle), math.sin(angle)])
+    focal = float(view.lens.camera_matrix[0, 0])
+    to_ground = np.stack([*view.rotation.T[:2], focal * view.rotation[:, 2]], axis=1)
+    to_ground[2] /= -view.height
+    members, lengths, lines = grow_lines(
+        flat,
+        directions,
+        clear,
+        candidates,
+        (parameters.tolerance, math.cos(parameters.alignment), parameters.least_points, parameters.most),
+        (parameters.largest_gap_pixels, parameters.largest_gap),
+        to_ground,
+    )
+    return [piece for piece in _pieces(flat[members], lengths, lines, view) if piece.length >= parameters.least_length]
 
 
 def _to_ground(flat: Array, view: View) -> Array:
@@ -323,54 +308,66 @@ def _to_ground(flat: Array, view: View) -> Array:
     return view.ground(flat @ view.rotation[:, :2].T + focal * view.rotation[:, 2])
 
 
-def _longest_run(points: Array, line: tuple[Array, Array], view: View, parameters: LineParameters) -> NDArray[np.intp]:
-    """Return the indices of the points of the part without a gap that has most points."""
-    centre, along = line
-    place = (points - centre) @ along
-    order = np.argsort(place)
-    place = place[order]
-    gaps = np.flatnonzero(place[1:] - place[:-1] > parameters.largest_gap_pixels)
-    if not len(gaps):
-        return order
-    before, after = (_to_ground(centre + place[ends, None] * along, view) for ends in (gaps, gaps + 1))
-    metres = np.linalg.norm(after - before, axis=1)
-    parts = np.split(order, gaps[~(metres <= parameters.largest_gap)] + 1)
-    return max(parts, key=len)
+def _pieces(points: Array, lengths: NDArray[np.intp], lines: Array, view: View) -> list[LinePiece]:
+    """Return the pieces that lines with their points make; those that are bent, or do not lie on the ground, are none.
+
+    Args:
+        points: (n, 2), line by line [px].
+        lengths: (m,) how many points each line has.
+        lines: (m, 4) see `Line`.
+        view: Of the picture.
+    """
+    if not len(lines):
+        return []
+    x, y, along_x, along_y = lines.T
+    starts = np.cumsum(lengths) - lengths
+    piece = np.repeat(np.arange(len(lines)), lengths)  # to which line each point belongs
+    offset_x, offset_y = points[:, 0] - x[piece], points[:, 1] - y[piece]
+    place = offset_x * along_x[piece] + offset_y * along_y[piece]
+    across = offset_y * along_x[piece] - offset_x * along_y[piece]
+    first, last = np.minimum.reduceat(place, starts), np.maximum.reduceat(place, starts)
+    residual = np.sqrt(np.add.reduceat(across * across, starts) / lengths)
+    bent = _bent(place, across, piece, starts, lengths, residual, last - first)
+    reach = np.stack([first, last])[..., None] * np.stack([along_x, along_y], axis=1)  # (2, pieces, 2)
+    ends = _to_ground((np.stack([x, y], axis=1) + reach).reshape(-1, 2), view).reshape(2, -1, 2)
+    good = np.isfinite(ends).all(axis=(0, 2)) & ~bent
+    return [
+        LinePiece(ends[0, index], ends[1, index], int(lengths[index]), float(residual[index]))
+        for index in np.flatnonzero(good).tolist()
+    ]
 
 
-def _bent(place: Array, across: Array, residual: float) -> bool:
-    """Return whether points follow an arc rather than a line: a parabola fits them much better.
+def _bent(
+    place: Array,
+    across: Array,
+    piece: NDArray[np.intp],
+    starts: NDArray[np.intp],
+    lengths: NDArray[np.intp],
+    residual: Array,
+    extent: Array,
+) -> NDArray[np.bool_]:
+    """Return (m,) whether points follow an arc rather than a line: a parabola fits them much better.
 
-    The line is the best one for the points, so that the sums of `place`, `across` and their product are zero.
+    Each line is the best one for its points, so that the sums of `place`, `across` and their product are zero.
     Then only the parabola's part that no line has needs to be fitted.
 
     Args:
-        place: (n,) along the line [px].
-        across: (n,) beside the line [px].
-        residual: Root mean square of `across` [px].
+        place: (n,) of the points along their lines [px], piece by piece.
+        across: (n,) beside them [px].
+        piece: (n,) to which piece each point belongs.
+        starts: (m,) index of each piece's first point.
+        lengths: (m,) how many points it has.
+        residual: (m,) root mean square of `across` [px].
+        extent: (m,) from the first to the last point [px].
     """
     squared = place * place
-    total = float(squared.sum())
-    if total == 0.0:
-        return False  # all points in one place
-    bow = squared - total / len(place) - float(squared @ place) / total * place  # a parabola across all lines
-    bows, fits = float(bow @ bow), float(bow @ across)
-    if bows < 1e-9 * total:
-        return False  # fewer than three places
-    sagitta = abs(fits) / bows * (0.5 * float(np.ptp(place))) ** 2
-    rest = max(residual**2 - fits**2 / bows / len(place), 0.0)
-    return sagitta > 1.0 and math.sqrt(rest) < 0.6 * residual
-
-
-def _piece(points: Array, line: tuple[Array, Array], view: View) -> LinePiece | None:
-    centre, along = line
-    offset = points - centre
-    place = offset @ along
-    across = offset @ np.array([-along[1], along[0]])
-    residual = math.sqrt(float(across @ across) / len(across))
-    if _bent(place, across, residual):
-        return None
-    ends = _to_ground(np.stack([centre + place.min() * along, centre + place.max() * along]), view)
-    if not np.isfinite(ends).all():
-        return None
-    return LinePiece(ends[0], ends[1], len(points), residual)
+    total = np.maximum(np.add.reduceat(squared, starts), 1e-12)
+    slope = np.add.reduceat(squared * place, starts) / total
+    bow = squared - (total / lengths)[piece] - slope[piece] * place  # a parabola across all lines
+    bows, fits = np.add.reduceat(bow * bow, starts), np.add.reduceat(bow * across, starts)
+    known = bows >= 1e-9 * total  # else there are fewer than three places
+    bows = np.where(known, bows, 1.0)
+    sagitta = np.abs(fits) / bows * (0.5 * extent) ** 2
+    rest = np.maximum(residual**2 - fits**2 / bows / lengths, 0.0)
+    bent: NDArray[np.bool_] = known & (sagitta > 1.0) & (np.sqrt(rest) < 0.6 * residual)
+    return bent

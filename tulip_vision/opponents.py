@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import nan
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,11 +29,19 @@ MOST_CANDIDATES = 8
 
 NEAR_REACH = 0.5
 """[rad] half the angle that an opponent fills whose feet are below the picture: it is less than a metre away."""
+NEAREST = 0.4
+"""[m] along the ground to an opponent's nearest marker: closer, the robots touch."""
 PARTLY_SEEN = 2.5
 """How many times less sure the place of an opponent is that the picture's edge or the own body hides in part."""
 UPRIGHT_RADIUS = 0.15
 """[m] from the axis of a post or pole up to which what touches the carpet is its foot: the net's and a shadow's too."""
 CARPET = Colour.GREEN | Colour.WHITE
+FIRST_LOOK, SECOND_LOOK = (9, 3.0), (13, 2.0)
+"""Number of cuts, and the distance between their samples [px]: the first look only says where to look closer."""
+LEAST_HIDDEN = 4
+"""[px] of carpet that a body hides, in height and in width: a foot 9 m away is twice that wide."""
+MOST_DOWN = 480.0
+"""[px] from a marker downwards."""
 
 
 @dataclass(frozen=True)
@@ -110,8 +119,10 @@ def find_opponents(
         parameters: How an opponent is recognised.
     """
     colour = MARKERS[parameters.team_colour][1]
-    found = patches(segmentation.mask(colour), parameters.least_area, MOST_CANDIDATES)
-    markers = [_marker(points, area, view) for points, area in found if _compact(points, area)]
+    above = max(parameters.highest_marker - view.height, 0.0)
+    top = view.first_row(above / math.hypot(above, NEAREST))
+    found = patches(segmentation.mask(colour, top), parameters.least_area, MOST_CANDIDATES, (0, top))
+    markers = _markers([(points, area) for points, area in found if _compact(points, area)], view)
     opponents: list[Feature] = []
     reach: list[float] = []  # [rad] half the angle that each opponent fills
     refusals: list[Refusal] = []
@@ -144,22 +155,28 @@ def _same(one: Feature, other: Feature, view: View, parameters: OpponentParamete
 
 def _compact(points: NDArray[np.int32], area: float) -> bool:
     """Return whether a patch is a marker and not a thin border where two other colours blend."""
-    width, height = np.ptp(points, axis=0) + 1
+    _, _, width, height = cv2.boundingRect(points)
     return bool(min(width, height) >= 3 and area >= 0.4 * width * height)
 
 
-def _marker(points: NDArray[np.int32], area: float, view: View) -> _Marker:
+def _markers(found: list[tuple[NDArray[np.int32], float]], view: View) -> list[_Marker]:
+    """Return the markers that patches, each with its area, are; worked on all at once."""
+    if not found:
+        return []
+    lengths = [len(points) for points, _ in found]
+    starts = np.concatenate([[0], np.cumsum(lengths)[:-1]])
+    points = np.concatenate([points for points, _ in found])
     azimuths, elevations = angles(view.directions_at(points[:, 0], points[:, 1]))
-    turned = (azimuths - azimuths[0] + math.pi) % (2.0 * math.pi) - math.pi + azimuths[0]
-    u, v = points.mean(axis=0)
-    return _Marker(
-        float(turned.max()),
-        float(turned.min()),
-        float(elevations.min()),
-        float(elevations.max()),
-        area,
-        (float(u), float(v)),
-    )
+    reference = np.repeat(azimuths[starts], lengths)
+    turned = (azimuths - reference + math.pi) % (2.0 * math.pi) - math.pi + reference  # no jump behind the robot
+    left, right = np.maximum.reduceat(turned, starts).tolist(), np.minimum.reduceat(turned, starts).tolist()
+    high, low = np.maximum.reduceat(elevations, starts).tolist(), np.minimum.reduceat(elevations, starts).tolist()
+    middles = (np.add.reduceat(points, starts) / np.array(lengths)[:, None]).tolist()
+    columns = zip(left, right, low, high, middles, strict=True)
+    return [
+        _Marker(one_left, one_right, lowest, highest, area, (u, v))
+        for (one_left, one_right, lowest, highest, (u, v)), (_, area) in zip(columns, found, strict=True)
+    ]
 
 
 def _examine(
@@ -181,7 +198,9 @@ def _examine(
     # First look: as wide as the markers at the same height together, which is enough to hit a foot or a leg.
     group = _joined(marker, markers, 2.0 * (marker.high - marker.low))
     half = max(0.6 * (group.left - group.right), width) + 2.0 * pixel
-    low = _contact(group, min(half, NEAR_REACH), uprights, segmentation, view, pixel)
+    if not _hides_carpet(marker, 1.5 * min(half, NEAR_REACH) / pixel, segmentation):
+        return "no body that stands on the carpet below the marker"
+    low = _contact(group, min(half, NEAR_REACH), FIRST_LOOK, uprights, segmentation, view, pixel)
     if low is None:
         return "no body that stands on the carpet below the marker"
     if math.isnan(low):
@@ -190,7 +209,7 @@ def _examine(
         return "stands beyond the carpet"
     # Second look, with the width that a body has at this range.
     distance = view.height / math.tan(-low)
-    again = _contact(group, parameters.half_width / distance, uprights, segmentation, view, pixel)
+    again = _contact(group, parameters.half_width / distance, SECOND_LOOK, uprights, segmentation, view, pixel)
     if again is not None and math.isnan(again):
         return _without_feet(marker, markers, view, parameters)
     low = low if again is None else again
@@ -227,6 +246,23 @@ def _examine(
     )
 
 
+def _hides_carpet(marker: _Marker, reach: float, segmentation: Segmentation) -> bool:
+    """Return whether something hides a bit of the carpet below a marker: no look at those behind the carpet's edge.
+
+    Args:
+        marker: Of the candidate.
+        reach: How far to either side to look [px].
+        segmentation: Of the picture.
+    """
+    u, v = marker.pixel
+    step = 1 + int(reach) // 40  # of what is large and close, some of the pixels tell enough
+    part = slice(max(int(v), 0), None, step), slice(max(int(u - reach), 0), max(int(u + reach) + 2, 0), step)
+    bare = segmentation.classes[part] & np.uint8(CARPET | Colour.ORANGE | Colour.YELLOW | Colour.BLUE) == 0
+    bare &= segmentation.on_carpet[part] != 0
+    hidden = cv2.reduce(bare.view(np.uint8), 0, cv2.REDUCE_SUM, dtype=cv2.CV_32S)
+    return int(np.count_nonzero(hidden >= LEAST_HIDDEN)) >= LEAST_HIDDEN
+
+
 def _without_feet(marker: _Marker, markers: list[_Marker], view: View, parameters: OpponentParameters) -> Feature | str:
     """Return an opponent so close that its feet are below the picture: its azimuth only."""
     if marker.area < 40.0 * parameters.least_area:
@@ -260,7 +296,13 @@ def _joined(marker: _Marker, markers: list[_Marker], reach: float) -> _Marker:
 
 
 def _contact(
-    marker: _Marker, half: float, uprights: Sequence[Feature], segmentation: Segmentation, view: View, pixel: float
+    marker: _Marker,
+    half: float,
+    look: tuple[int, float],
+    uprights: Sequence[Feature],
+    segmentation: Segmentation,
+    view: View,
+    pixel: float,
 ) -> float | None:
     """Return the elevation at which the body's lowest point meets the carpet [rad].
 
@@ -270,15 +312,16 @@ def _contact(
     Args:
         marker: Where to start.
         half: Half the angle of the fan [rad].
+        look: Number of cuts, and the distance between their samples [px].
         uprights: Goal posts and poles.
         segmentation: Of the picture.
         view: Of the picture.
         pixel: Angle of one pixel [rad].
     """
-    azimuths = np.linspace(marker.azimuth - half, marker.azimuth + half, 13)
-    step = 2.0 * pixel
+    azimuths = np.linspace(marker.azimuth - half, marker.azimuth + half, look[0])
+    step = look[1] * pixel
     bottom = view.lowest_elevation - 3.0 * step
-    elevations = np.arange(0.5 * (marker.low + marker.high), bottom, -step)[:240]
+    elevations = np.arange(0.5 * (marker.low + marker.high), bottom, -step)[: int(MOST_DOWN / look[1])]
     if len(elevations) < 4:
         return None  # the marker touches the lower edge of the picture
     pixels = view.pixels_of_directions(fan_of(azimuths, elevations))

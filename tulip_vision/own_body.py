@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-import cv2
 import numpy as np
 
 from tulip_description.camera_pose import camera_in_footprint
@@ -41,8 +40,12 @@ class OwnBody:
             for box in link.boxes
             if link.name in places and link.name not in UNSEEN
         ]
-        self._lower = np.array([middle - size / 2.0 - MARGIN for middle, size in boxes])  # (boxes, 3) in base_link [m]
-        self._upper = np.array([middle + size / 2.0 + MARGIN for middle, size in boxes])
+        middles, halves = (
+            np.array(each) for each in zip(*((m, size / 2.0 + MARGIN) for m, size in boxes), strict=True)
+        )
+        self._lower, self._upper = middles - halves, middles + halves  # (boxes, 3) in base_link [m]
+        signs = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+        self._corners = (middles[:, None] + signs * halves[:, None]).reshape(-1, 3)
 
     def mask(self, view: View) -> Mask:
         """Return (height, width) 255 where the picture may show the own trunk or arms, else 0."""
@@ -50,24 +53,29 @@ class OwnBody:
         pan = math.atan2(float(ahead[1]), float(ahead[0]))
         tilt = -math.asin(float(np.clip(ahead[2], -1.0, 1.0)))
         eye = camera_in_footprint(self._robot, 0.0, (0.0, 0.0, 0.0, 1.0), pan, tilt)[:3, 3]  # in base_link
-        table = view.lens.coarse_ray_table(STEP)
+        whole: Mask = np.zeros((view.lens.height, view.lens.width), dtype=np.uint8)
+        # All boxes are below the eye, so that none is seen higher than the corner that is.
+        way = self._corners - eye
+        highest = float((way[:, 2] / np.linalg.norm(way, axis=1)).max())
+        rows = np.flatnonzero(np.fmin.reduce(view.coarse_sines(STEP), axis=1) < highest)
+        if not len(rows):
+            return whole
+        table = view.lens.coarse_ray_table(STEP)[rows[0] : rows[-1] + 1]
         rays = view.rotation.astype(np.float32) @ table.reshape(-1, 3).T
-        with np.errstate(divide="ignore"):
-            inverse = 1.0 / rays  # (3, rays); corners of a fisheye's picture are NaN, and stay so
         met = np.zeros(rays.shape[1], dtype=np.bool_)
-        lower, upper = (self._lower - eye).astype(np.float32), (self._upper - eye).astype(np.float32)
-        for low, high in zip(lower[..., None], upper[..., None], strict=True):
-            with np.errstate(invalid="ignore"):
+        lower, upper = ((corners - eye).astype(np.float32)[..., None] for corners in (self._lower, self._upper))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = np.float32(1.0) / rays  # (3, rays); corners of a fisheye's picture are NaN, and stay so
+            for low, high in zip(lower, upper, strict=True):
                 one, other = low * inverse, high * inverse
                 (x0, y0, z0), (x1, y1, z1) = np.minimum(one, other), np.maximum(one, other)
                 enter, leave = np.maximum(np.maximum(x0, y0), z0), np.minimum(np.minimum(x1, y1), z1)
                 met |= (enter < leave) & (leave > 0.0)
-        blocks = met.reshape(table.shape[:2]).astype(np.uint8) * np.uint8(255)
-        rows, columns = view.lens.height, view.lens.width
-        if not met.any():
-            return np.zeros((rows, columns), dtype=np.uint8)
-        size = (blocks.shape[1] * STEP, blocks.shape[0] * STEP)
-        fine = cv2.resize(blocks, size, interpolation=cv2.INTER_NEAREST)
-        missing = (max(rows - size[1], 0), max(columns - size[0], 0))
-        fine = cv2.copyMakeBorder(fine, 0, missing[0], 0, missing[1], cv2.BORDER_REPLICATE)[:rows, :columns]
-        return np.asarray(fine, dtype=np.uint8)
+        blocks = met.reshape(table.shape[:2])
+        first, count = STEP * int(rows[0]), view.lens.coarse_ray_table(STEP).shape[0]
+        end = view.lens.height if rows[-1] == count - 1 else STEP * (int(rows[-1]) + 1)
+        # Pixels beyond the last whole block are like that block: one more is put there, and cut to fit.
+        wider = np.concatenate([blocks, blocks[:, -1:]], axis=1).astype(np.uint8) * np.uint8(255)
+        higher = np.concatenate([wider, wider[-1:]])
+        whole[first:end] = np.repeat(np.repeat(higher, STEP, axis=1)[:, : whole.shape[1]], STEP, axis=0)[: end - first]
+        return whole

@@ -10,6 +10,7 @@ import numpy as np
 
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
+from tulip_vision.patches import patches
 from tulip_vision.segmentation import Colour, Segmentation, belongs
 from tulip_vision.upright import Upright, axis_samples, find_uprights, foot_on_ground
 from tulip_vision.view import Mask, View, direction_of
@@ -19,6 +20,10 @@ PATTERNS = {
     FeatureClass.POLE_BLUE_YELLOW_BLUE: (Colour.BLUE, Colour.YELLOW, Colour.BLUE),
 }
 """Colours of the segments from the ground upwards."""
+
+LEAST_SEGMENT = 8.0
+"""[px^2] a blue segment covers 100 at 8 m, and a part of that behind something else."""
+MOST_SEGMENTS = 12
 
 
 @dataclass(frozen=True)
@@ -58,13 +63,17 @@ class PoleParameters:
 
 def find_poles(segmentation: Segmentation, view: View, parameters: PoleParameters) -> Findings:
     """Return the landmark poles with the direction of their feet."""
-    blue = np.bitwise_and(segmentation.mask(Colour.BLUE), view.below_horizon)
-    left, top, width, height = cv2.boundingRect(blue)
-    if width == 0:
+    first = view.first_row()
+    blue = segmentation.mask(Colour.BLUE, first) & view.below_horizon[first:]
+    segments = [cv2.boundingRect(points) for points, _ in patches(blue, LEAST_SEGMENT, MOST_SEGMENTS, (0, first))]
+    if not segments:
         return Findings()
+    left, top = (min(segment[axis] for segment in segments) for axis in (0, 1))
+    right, bottom = (max(segment[axis] + segment[axis + 2] for segment in segments) for axis in (0, 1))
     # Yellow segments lie at most one blue one above or below; with some slack for the view from above.
+    width, height = (max(segment[axis] for segment in segments) for axis in (2, 3))
     corner = max(left - width, 0), max(top - 2 * height, 0)
-    part = slice(corner[1], top + 3 * height), slice(corner[0], left + 2 * width)
+    part = slice(corner[1], bottom + 2 * height), slice(corner[0], right + width)
     either = belongs(segmentation.classes[part], Colour.YELLOW | Colour.BLUE).view(np.uint8)
     # Where yellow meets blue the blend is neither: close gaps of up to four pixels, upwards only.
     mask: Mask = cv2.morphologyEx(either, cv2.MORPH_CLOSE, np.ones((5, 1), dtype=np.uint8))

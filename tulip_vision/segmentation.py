@@ -22,6 +22,9 @@ from tulip_vision.view import Array, Mask, View
 Picture = NDArray[np.uint8]
 
 
+LUT_TAKES_WORDS = int(cv2.__version__.split(".")[0]) >= 5
+"""Whether `cv2.LUT` looks up 16-bit indices: a quarter of the time of `np.take`."""
+
 LEAST_COSINE = 0.1
 """Of the angle to the optical axis, 84 deg, up to which the carpet's outline is looked for."""
 
@@ -166,9 +169,9 @@ class Segmentation:
     brightness: float
     carpet_share: float
 
-    def mask(self, colours: Colour) -> Mask:
-        """Return (height, width) nonzero where a pixel belongs to one of the classes."""
-        found: Mask = np.bitwise_and(self.classes, np.uint8(colours))
+    def mask(self, colours: Colour, top: int = 0) -> Mask:
+        """Return (height - top, width) nonzero where a pixel from row `top` on belongs to one of the classes."""
+        found: Mask = np.bitwise_and(self.classes[top:], np.uint8(colours))
         return found
 
 
@@ -177,6 +180,17 @@ def belongs(classes: Mask, colours: Colour) -> NDArray[np.bool_]:
     # Without the conversion numpy takes an enumeration's member for a wide integer, and computes with those.
     found: NDArray[np.bool_] = np.bitwise_and(classes, np.uint8(colours)) != 0
     return found
+
+
+def _whiteness_table() -> NDArray[np.uint8]:
+    """Return (65536,) the smaller of red and blue of each cell's middle, 0 to 255; the upper half is empty."""
+    index = np.arange(2**15)
+    table = np.zeros(2**16, dtype=np.uint8)
+    table[: len(index)] = 8 * np.minimum((index >> 10) & 31, index & 31) + 4
+    return table
+
+
+WHITENESS = _whiteness_table()
 
 
 class Segmenter:
@@ -188,7 +202,10 @@ class Segmenter:
         self._tables: dict[int, NDArray[np.uint8]] = {}
 
     def table(self, brightness: float) -> NDArray[np.uint8]:
-        """Return the (32768,) colour table for a carpet of this brightness over the reference brightness."""
+        """Return the (65536,) colour table for a carpet of this brightness over the reference brightness.
+
+        Colours have 15 bits; the upper half is empty, and there because `cv2.LUT` takes tables of this size only.
+        """
         step = math.log(self._parameters.brightness_step)
         level = int(np.clip(round(math.log(max(brightness, 1e-3)) / step), -8, 5))
         if level not in self._tables:
@@ -206,14 +223,17 @@ class Segmenter:
         brightness = self._brightness(picture)
         packed = cv2.cvtColor(picture, cv2.COLOR_BGR2BGR555)  # two bytes a pixel, little-endian: 0rrrrrgg gggbbbbb
         index = packed.view(np.uint16).reshape(picture.shape[:2])
-        classes: Mask = np.take(self.table(brightness), index, mode="wrap")  # every index is inside: saves the check
-        whiteness: Mask = cv2.min(cv2.extractChannel(picture, 0), cv2.extractChannel(picture, 2))
+        classes = self._look_up(index, self.table(brightness))
+        whiteness = self._look_up(index, WHITENESS)
         if own_body is None:
             own_body = np.zeros(classes.shape, dtype=np.uint8)
         elif own_body.any():
             # Where the trunk leans otherwise than thought, the field shows, in colours that the own body has not.
-            own_body = np.asarray(cv2.bitwise_and(own_body, cv2.compare(classes & FIELD, 0, cv2.CMP_EQ)), np.uint8)
-            classes = np.asarray(cv2.bitwise_and(classes, cv2.bitwise_not(own_body)), np.uint8)
+            own_body = own_body.copy()
+            left, top, width, height = cv2.boundingRect(own_body)
+            part = slice(top, top + height), slice(left, left + width)
+            own_body[part] &= cv2.compare(classes[part] & FIELD, 0, cv2.CMP_EQ)
+            classes[part] &= ~own_body[part]
         outline = self._outline(classes, view)
         on_carpet: Mask = np.zeros(classes.shape, dtype=np.uint8)
         if len(outline):
@@ -224,9 +244,16 @@ class Segmenter:
         share = float(np.count_nonzero(sampled)) / max(sampled.size, 1)
         return Segmentation(classes, whiteness, on_carpet, outline, own_body, brightness, share)
 
+    @staticmethod
+    def _look_up(index: NDArray[np.uint16], table: NDArray[np.uint8]) -> Mask:
+        """Return `table` (65536,) at each of (height, width) indices."""
+        if LUT_TAKES_WORDS:
+            return np.asarray(cv2.LUT(index, table.reshape(1, -1)), np.uint8)
+        return np.take(table, index, mode="wrap")  # every index is inside: saves the check
+
     def _make_table(self, brightness: float) -> NDArray[np.uint8]:
         hue, saturation, value = self._cells
-        table = np.zeros(32 * 32 * 32, dtype=np.uint8)
+        table = np.zeros(2**16, dtype=np.uint8)
         for colour in Colour:
             box = self._parameters.colours.of(colour)
             low, high = box.hue
@@ -235,7 +262,7 @@ class Segmenter:
             least = min(box.value[0] * brightness, 0.8)
             most = 1.0 if box.value[1] >= 1.0 else min(box.value[1] * brightness, 1.0)
             fits = in_hue & (saturation >= box.saturation[0]) & (saturation <= box.saturation[1])
-            table[fits & (value >= least) & (value <= most)] |= int(colour)
+            table[: len(hue)][fits & (value >= least) & (value <= most)] |= int(colour)
         return table
 
     @cached_property
@@ -255,15 +282,18 @@ class Segmenter:
 
     def _brightness(self, picture: Picture) -> float:
         """Return the carpet's value over the reference, from every eighth pixel; 1 if there is hardly any green."""
-        hsv = cv2.cvtColor(picture[::8, ::8], cv2.COLOR_BGR2HSV)
+        height, width = picture.shape[:2]
+        small = cv2.resize(picture, (-(-width // 8), -(-height // 8)), interpolation=cv2.INTER_NEAREST)
+        hsv = cv2.cvtColor(small, cv2.COLOR_BGR2HSV)
         box = self._parameters.colours.green
         # OpenCV keeps hue / 2 in a byte.
         low = (math.ceil(box.hue[0] / 2.0), math.ceil(255.0 * box.saturation[0]), 20)
         green = cv2.inRange(hsv, low, (math.floor(box.hue[1] / 2.0), 255, 255))
-        values = hsv[..., 2][green != 0]
-        if len(values) < 0.02 * green.size:
+        count = np.cumsum(np.bincount(hsv[..., 2][green != 0], minlength=256))
+        if count[-1] < 0.02 * green.size:
             return 1.0
-        return float(np.median(values)) / 255.0 / self._parameters.reference_brightness
+        median = int(np.searchsorted(count, 0.5 * count[-1]))
+        return median / 255.0 / self._parameters.reference_brightness
 
     def _outline(self, classes: Mask, view: View) -> Array:
         """Return the carpet's upper edge: the hull of the tops of each column's lowest run of carpet.
@@ -362,18 +392,14 @@ def _from_level_plane(view: View, points: Array) -> Array:
 
 
 def _upper_hull(points: Array) -> NDArray[np.intp]:
-    """Return the indices of the upper convex hull of (n, 2) points, left to right (Andrew's monotone chain)."""
-    places: list[list[float]] = points.tolist()  # plain numbers: numpy is slow one by one
-    chain: list[int] = []
-    for index in np.lexsort((points[:, 1], points[:, 0])).tolist():
-        x, y = places[index]
-        while len(chain) >= 2:
-            (x0, y0), (x1, y1) = places[chain[-2]], places[chain[-1]]
-            if (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) < 0.0:
-                break
-            chain.pop()
-        chain.append(index)
-    return np.array(chain, dtype=np.intp)
+    """Return the indices of the upper convex hull of (n, 2) points, left to right."""
+    whole = cv2.convexHull(points.astype(np.float32), clockwise=False, returnPoints=False).reshape(-1)
+    x = points[whole, 0]
+    # OpenCV means a picture, where y grows downwards; here it grows upwards: the upper side begins at the right.
+    first = np.roll(whole, -int(np.argmax(x)))
+    count = (int(np.argmin(x)) - int(np.argmax(x))) % len(whole) + 1
+    upper: NDArray[np.intp] = first[:count][::-1].astype(np.intp)
+    return upper
 
 
 def _picture_edge(outline: Array, view: View, near: float) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -11,10 +12,14 @@ from numpy.typing import NDArray
 
 from tulip_vision.patches import patches
 from tulip_vision.segmentation import Colour, Segmentation, belongs
-from tulip_vision.view import Array, Mask, View, angles, direction_of, fan_of
+from tulip_vision.view import Array, Mask, View, angles, direction_of, directions_of
 
 MOST_CANDIDATES = 12
 """The largest patches are looked at; a crowd in yellow shirts must not cost time without bound."""
+BELOW, LEAST_BELOW = np.arange(2.0, 6.0), 3
+"""[px] below an upright's foot at which carpet is looked for, and how many must show it."""
+ABOVE, LEAST_ABOVE = np.arange(1.0, 8.0), 2
+"""[px] the same for blue above its upper end."""
 LEAST_SLENDERNESS = 0.6
 """Height over width; one segment of a pole is as high as wide, seen from above a bit less."""
 
@@ -28,6 +33,7 @@ class Upright:
         width: Angle between its left and right edge [rad].
         low, high: Elevation of its lowest and highest point [rad].
         foot_seen: True where carpet is seen right below it.
+        blue_above: True where something blue begins right above it.
         on_carpet: True where its lowest point is inside the carpet's outline or at the lower edge of the picture.
         cut: True where the left or right edge of the picture cuts it.
         reaches_up: True where it goes on to the horizon or the upper edge of the picture.
@@ -40,6 +46,7 @@ class Upright:
     low: float
     high: float
     foot_seen: bool
+    blue_above: bool
     on_carpet: bool
     cut: bool
     reaches_up: bool
@@ -63,18 +70,14 @@ def find_uprights(
         least_area: Smaller patches are noise [px^2].
         corner: u, v in the picture of the mask's first pixel.
     """
-    left, top, width, height = cv2.boundingRect(mask)
-    if width == 0:
-        return []
-    u, v = corner[0] + left, corner[1] + top
-    horizon = view.below_horizon[v : v + height, u : u + width]
-    below = np.bitwise_and(mask[top : top + height, left : left + width], horizon)
-    found = []
+    u, v = corner
+    below = mask & view.below_horizon[v : v + len(mask), u : u + mask.shape[1]]
+    slender = []
     for points, _ in patches(below, least_area, MOST_CANDIDATES, (u, v)):
         _, _, width, height = cv2.boundingRect(points)
         if height > LEAST_SLENDERNESS * width:
-            found.append(_measure(points, segmentation, view))
-    return found
+            slender.append(points)
+    return _measure(slender, segmentation, view) if slender else []
 
 
 def axis_samples(view: View, image: NDArray[np.uint8], foot: Array, heights: Array) -> NDArray[np.uint8]:
@@ -112,36 +115,77 @@ def foot_on_ground(view: View, azimuth: float, low: float, depth: float) -> tupl
     return foot, -math.atan2(view.height, distance)
 
 
-def _measure(points: NDArray[np.int32], segmentation: Segmentation, view: View) -> Upright:
+def _measure(contours: list[NDArray[np.int32]], segmentation: Segmentation, view: View) -> list[Upright]:
+    """Return what each contour, (n, 2) pixels, is as an upright; what takes arrays is done for all at once."""
+    points = np.concatenate(contours)
+    starts = np.cumsum([0, *(len(each) for each in contours)])
     azimuths, elevations = angles(view.directions_at(points[:, 0], points[:, 1]))
+    parts = [slice(first, last) for first, last in pairwise(starts.tolist())]
+    shapes = [_shape(azimuths[part], elevations[part], view) for part in parts]
+    azimuth, foot, high, pixel = np.array([[each.azimuth, each.foot, each.high, each.pixel] for each in shapes]).T[
+        ..., None
+    ]
+    beside = np.concatenate([foot - BELOW * pixel, high + ABOVE * pixel], axis=1)  # elevations, a row for each
+    places = directions_of(np.repeat(azimuth, beside.shape[1], axis=1).reshape(-1), beside.reshape(-1))
+    read, inside = view.sample_all((segmentation.classes, segmentation.on_carpet), view.pixels_of_directions(places))
+    classes, carpet, inside = (each.reshape(beside.shape) for each in (*read, inside))
+    ground = belongs(classes, Colour.GREEN | Colour.WHITE) & (carpet != 0) & inside
+    fits = np.count_nonzero(ground[:, : len(BELOW)], axis=1) >= LEAST_BELOW
+    blue = np.count_nonzero(belongs(classes[:, len(BELOW) :], Colour.BLUE), axis=1) >= LEAST_ABOVE
+    rows, columns = segmentation.classes.shape
+    found = []
+    for index, (contour, shape) in enumerate(zip(contours, shapes, strict=True)):
+        (lowest_u, lowest_v), top = contour[shape.lowest].tolist(), int(contour[shape.highest, 1])
+        left, _, width, _ = cv2.boundingRect(contour)
+        found.append(
+            Upright(
+                azimuth=(shape.azimuth + math.pi) % (2.0 * math.pi) - math.pi,
+                width=shape.width,
+                low=shape.foot,
+                high=shape.high,
+                foot_seen=bool(fits[index]),
+                blue_above=bool(blue[index]),
+                on_carpet=bool(lowest_v >= rows - 2 or segmentation.on_carpet[lowest_v, lowest_u] != 0),
+                cut=left <= 0 or left + width >= columns,
+                reaches_up=shape.high > -4.0 * shape.pixel or top <= 1,
+                pixel=(float(lowest_u), float(lowest_v)),
+                pixel_angle=shape.pixel,
+            )
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class _Shape:
+    azimuth: float  # of the middle [rad]
+    width: float  # [rad]
+    foot: float  # elevation [rad]
+    high: float  # elevation [rad]
+    pixel: float  # angle of one pixel [rad]
+    lowest: int  # index of the lowest point
+    highest: int
+
+
+def _shape(azimuths: Array, elevations: Array, view: View) -> _Shape:
+    """Return middle, edges and foot of a contour, (n,) angles [rad]."""
     reference = float(azimuths[0])
     turned = (azimuths - reference + math.pi) % (2.0 * math.pi) - math.pi  # no jump at the back of the robot
-    lowest, highest = int(np.argmin(elevations)), int(np.argmax(elevations))
+    lowest, highest = int(elevations.argmin()), int(elevations.argmax())
     low, high = float(elevations[lowest]), float(elevations[highest])
     pixel = view.angle_per_pixel(direction_of(float(azimuths[lowest]), low))
     # The lower two thirds: whatever hangs onto the upper end (a crossbar close by, a net) does not move the middle.
     lower = turned[elevations <= low + max(0.66 * (high - low), 2.0 * pixel)]
     lower.sort()
-    # The 94th and the 6th percentile, as `np.percentile` has them.
-    left, right = np.interp([0.94 * (len(lower) - 1), 0.06 * (len(lower) - 1)], np.arange(len(lower)), lower).tolist()
-    middle = reference + 0.5 * (left + right)
-    rows, columns = segmentation.classes.shape
-    near_middle = np.abs(turned - (middle - reference)) <= 0.35 * (left - right) + pixel
-    foot = float(elevations[near_middle].min()) - 0.5 * pixel if near_middle.any() else low
-    under = [foot - step * pixel for step in (2.0, 3.0, 4.0, 5.0)]
-    below = view.pixels_of_directions(fan_of(middle, under))
-    (classes, carpet), inside = view.sample_all((segmentation.classes, segmentation.on_carpet), below)
-    ground = belongs(classes, Colour.GREEN | Colour.WHITE) & (carpet != 0) & inside
-    top, bottom = points[highest], points[lowest]
-    return Upright(
-        azimuth=(middle + math.pi) % (2.0 * math.pi) - math.pi,
-        width=left - right + pixel,
-        low=foot,
-        high=high,
-        foot_seen=int(ground.sum()) >= 3,
-        on_carpet=bool(bottom[1] >= rows - 2 or segmentation.on_carpet[bottom[1], bottom[0]] != 0),
-        cut=bool(points[:, 0].min() <= 0 or points[:, 0].max() >= columns - 1),
-        reaches_up=bool(high > -4.0 * pixel or top[1] <= 1),
-        pixel=(float(bottom[0]), float(bottom[1])),
-        pixel_angle=pixel,
-    )
+    left, right = (_at_share(lower, share) for share in (0.94, 0.06))
+    middle = 0.5 * (left + right)
+    near_middle = elevations[np.abs(turned - middle) <= 0.35 * (left - right) + pixel]
+    foot = float(near_middle.min()) - 0.5 * pixel if len(near_middle) else low
+    return _Shape(reference + middle, left - right + pixel, foot, high, pixel, lowest, highest)
+
+
+def _at_share(ordered: Array, share: float) -> float:
+    """Return a percentile of (n,) values in rising order, as `np.percentile` has it."""
+    place = share * (len(ordered) - 1)
+    index = min(int(place), len(ordered) - 2) if len(ordered) > 1 else 0
+    low, high = float(ordered[index]), float(ordered[min(index + 1, len(ordered) - 1)])
+    return low + (place - index) * (high - low)

@@ -33,11 +33,11 @@ class SpreadParameters:
         pose_elevation: Of the camera pose's tilt, from the IMU and the same causes [rad].
     """
 
-    # Measured by bench vision, standing and walking: 0.1 to 0.5 px, 0.03 to 0.07 deg, 0.05 to 0.15 deg. Another 0.1 deg
-    # is left for how well a camera's mount can be calibrated, which no error of the simulated sensors stands for.
+    # Measured by bench vision, standing and walking: 0.1 to 0.5 px, 0.01 to 0.07 deg, 0.02 deg. Another 0.1 deg is left
+    # for how well a camera's mount can be calibrated, which no error of the simulated sensors stands for.
     pixel: float = 0.5  # [px] blur and colour borders
     pose_azimuth: float = math.radians(0.1)  # [rad] encoders, and time between picture and pose
-    pose_elevation: float = math.radians(0.2)  # [rad] the IMU's bias in roll and pitch most of all
+    pose_elevation: float = math.radians(0.1)  # [rad] the mount, and soles that do not lie quite flat
 
     def __post_init__(self) -> None:
         """Check the values.
@@ -83,6 +83,7 @@ class View:
         self.rotation = rotation
         self.position = transform[:3, 3].copy()
         self.spread = spread
+        self._coarse_sines: dict[int, NDArray[np.float32]] = {}
 
     @cached_property
     def middle_sines(self) -> Array:
@@ -92,16 +93,18 @@ class View:
 
     def coarse_sines(self, step: int) -> NDArray[np.float32]:
         """Return (rows, columns) sine of the elevation seen at the pixels of `Lens.coarse_ray_table`."""
-        rays = self.lens.coarse_ray_table(step)
-        sines: NDArray[np.float32] = rays.reshape(-1, 3) @ self.rotation[2].astype(np.float32)
-        return sines.reshape(rays.shape[:2])
+        if step not in self._coarse_sines:
+            rays = self.lens.coarse_ray_table(step)
+            sines: NDArray[np.float32] = rays.reshape(-1, 3) @ self.rotation[2].astype(np.float32)
+            self._coarse_sines[step] = sines.reshape(rays.shape[:2])
+        return self._coarse_sines[step]
 
     @cached_property
     def below_horizon(self) -> Mask:
         """(height, width) 255 where a pixel looks below the horizon, else 0."""
         # Most rows lie on one side of the horizon as a whole, as one pixel in a block tells: only the rest is work.
         coarse = self.coarse_sines(HORIZON_STEP)
-        margin = 2.0 * HORIZON_STEP / float(self.lens.camera_matrix[1, 1])  # more than sines change within a block
+        margin = HORIZON_STEP / float(self.lens.camera_matrix[1, 1])  # twice what sines change within a block
         side = np.zeros(self.lens.height, dtype=np.int8)  # -1 below, 1 above, 0 not known
         blocks = (coarse.min(axis=1) > margin).astype(np.int8) - (coarse.max(axis=1) < -margin)
         rows = np.repeat(blocks, HORIZON_STEP)[: len(side)]
@@ -112,8 +115,15 @@ class View:
         if len(mixed):
             part = slice(int(mixed[0]), int(mixed[-1]) + 1)
             sines = cv2.transform(self.lens.ray_table()[part], self.rotation[2:].astype(np.float32))
-            below[part] = np.where(sines < 0.0, np.uint8(255), np.uint8(0))
+            below[part] = cv2.compare(sines, 0.0, cv2.CMP_LT)
         return below
+
+    def first_row(self, sine: float = 0.0) -> int:
+        """Return the picture's first row that may show something lower than an elevation, given by its sine."""
+        lowest = np.fmin.reduce(self.coarse_sines(HORIZON_STEP), axis=1)
+        margin = HORIZON_STEP / float(self.lens.camera_matrix[1, 1])
+        found = np.flatnonzero(lowest < sine + margin)
+        return HORIZON_STEP * int(found[0]) if len(found) else self.lens.height
 
     @cached_property
     def lowest_elevation(self) -> float:
@@ -186,13 +196,9 @@ class View:
 
     def inside(self, pixels: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Return (n,) whether (n, 2) pixels lie in the picture, `margin` pixels from its edges."""
-        with np.errstate(invalid="ignore"):
-            found: NDArray[np.bool_] = (
-                (pixels[:, 0] >= margin)
-                & (pixels[:, 1] >= margin)
-                & (pixels[:, 0] <= self.lens.width - 1 - margin)
-                & (pixels[:, 1] <= self.lens.height - 1 - margin)
-            )
+        u, v = pixels.T
+        found: NDArray[np.bool_] = (u >= margin) & (u <= self.lens.width - 1 - margin)  # NaN is neither
+        found &= (v >= margin) & (v <= self.lens.height - 1 - margin)
         return found
 
     def sample(self, image: NDArray[Any], pixels: Array) -> tuple[NDArray[Any], NDArray[np.bool_]]:
@@ -209,9 +215,12 @@ class View:
     ) -> tuple[list[NDArray[Any]], NDArray[np.bool_]]:
         """Read several images at the same (n, 2) pixels, as `sample` does one."""
         inside = self.inside(pixels)
+        whole = bool(inside.all())
         # Half a pixel is added and cut off: that rounds, as no pixel inside is negative.
-        nearest = (np.where(inside[:, None], pixels, 0.0) + 0.5).astype(np.intp)
-        return [np.where(inside, image[nearest[:, 1], nearest[:, 0]], 0) for image in images], inside
+        u, v = ((pixels if whole else np.where(inside[:, None], pixels, 0.0)) + 0.5).astype(np.intp).T
+        index = v * self.lens.width + u
+        read = [image.reshape(-1)[index] for image in images]
+        return read if whole else [np.where(inside, values, 0) for values in read], inside
 
     def coverage(self) -> Array:
         """Return (4,) azimuth of left and right edge, elevation of lower and upper edge, at the middle [rad]."""
@@ -230,6 +239,12 @@ def direction_of(azimuth: float, elevation: float) -> Array:
     """Return the (3,) unit vector with these angles [rad]."""
     level = math.cos(elevation)
     return np.array([level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)])
+
+
+def directions_of(azimuths: Array, elevations: Array) -> Array:
+    """Return (n, 3) unit vectors with (n,) azimuths and elevations [rad]."""
+    level = np.cos(elevations)
+    return np.stack([level * np.cos(azimuths), level * np.sin(azimuths), np.sin(elevations)], axis=1)
 
 
 def fan_of(azimuths: ArrayLike, elevations: ArrayLike) -> Array:
