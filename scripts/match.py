@@ -20,13 +20,16 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
+from tulip_sim.lockstep import Settings
 from tulip_sim.match_graph import play_graph
 from tulip_sim.match_lockstep import play_lockstep
+from tulip_sim.perception import PerceptionParameters
 from tulip_sim.scenario import SCENARIOS
 from tulip_sim.trial import TrialSummary
 from tulip_strategy.game_controller import REFEREE_PORT
 
 MODES = ("graph", "lockstep")
+EYES = {"camera": None, "degraded": PerceptionParameters(), "ideal": PerceptionParameters.ideal()}
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 LONGEST = 155.0  # [s] preparation and 150 s of play
 
@@ -43,6 +46,10 @@ def main(
         int, typer.Option(help="UDP port of the referee (graph).", min=1, max=65535)
     ] = REFEREE_PORT,
     logs: Annotated[Path | None, typer.Option(help="Folder for one log file a node (graph).")] = None,
+    eyes: Annotated[
+        str,
+        typer.Option(help="camera (pictures and vision), or features made up from the truth: degraded or ideal"),
+    ] = "camera",
 ) -> None:
     """Play one trial. The exit code is 0 after a goal, 1 without one, 2 for bad input, 130 after Ctrl-C."""
     folder: Path | None = None
@@ -52,6 +59,8 @@ def main(
             raise BadInputError(f"--mode is {mode!r}; expected one of {', '.join(MODES)}.")
         if scenario not in SCENARIOS:
             raise unknown("scenario", scenario, SCENARIOS)
+        if eyes not in EYES:
+            raise BadInputError(f"--eyes is {eyes!r}; expected one of {', '.join(EYES)}.")
         if mode != "graph" and (parameters or logs):
             raise BadInputError("--parameters and --logs are for nodes; expected --mode graph with them.")
         if json_path is not None:
@@ -80,10 +89,12 @@ def main(
                     parameters or (),
                     referee_port=referee_port,
                     logs=logs,
+                    perception=EYES[eyes],
                 )
             else:
-                two_cores = (os.cpu_count() or 1) > 1
-                summary = play_lockstep(seed, scenario, record=folder, progress=show, eyes_beside=two_cores)
+                beside = (os.cpu_count() or 1) > 1 and EYES[eyes] is None
+                settings = Settings(perception=EYES[eyes])
+                summary = play_lockstep(seed, scenario, settings, folder, show, eyes_beside=beside)
     except BadInputError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from None

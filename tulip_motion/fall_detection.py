@@ -11,6 +11,7 @@ A tilt alone tells late: at 0.7 rad the robot is on the ground within 0.06 s. Tw
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from numpy.typing import NDArray
 from tulip_motion.parameters import MotionParameters
 
 Array = NDArray[np.float64]
+Places = Sequence[Sequence[float]]
+"""(x, y, z) of the left and the right sole in odom [m]."""
 
 
 class FallDetector:
@@ -29,14 +32,14 @@ class FallDetector:
         self._falling = 0
         self._upright = 0
 
-    def is_falling(self, rotation: Array, angular_velocity: Array, dcm: tuple[float, float], soles: Array) -> str:
+    def is_falling(self, rotation: Array, angular_velocity: Array, dcm: tuple[float, float], soles: Places) -> str:
         """Return why the robot falls, in words, or "" as long as it may stay up.
 
         Args:
             rotation: (3, 3) from base_link to odom.
             angular_velocity: (3,) of base_link, odom axes [rad/s].
             dcm: (x, y) in odom [m].
-            soles: (2, 4, 4) transforms of the soles in odom.
+            soles: Places of the left and the right one in odom [m].
         """
         p = self._parameters
         tilt, predicted = predicted_tilt(rotation, angular_velocity, p.fall_horizon)
@@ -93,20 +96,19 @@ def predicted_tilt(rotation: Array, angular_velocity: Array, horizon: float) -> 
     return tilt, math.hypot(scale * up_x + horizon * rate_x, scale * up_y + horizon * rate_y)
 
 
-def beyond_feet(rotation: Array, dcm: tuple[float, float], soles: Array, zmp_forward: float) -> tuple[float, float]:
+def beyond_feet(rotation: Array, dcm: tuple[float, float], soles: Places, zmp_forward: float) -> tuple[float, float]:
     """Return how far the DCM is from the line between the feet: forward and left of the torso [m].
 
     Args:
         rotation: (3, 3) from base_link to odom.
         dcm: (x, y) in odom [m].
-        soles: (2, 4, 4) transforms of the soles in odom.
+        soles: Places of the left and the right one in odom [m].
         zmp_forward: Middle of a sole ahead of its ankle [m].
     """
     yaw = math.atan2(rotation[1, 0], rotation[0, 0])
     c, s = math.cos(yaw), math.sin(yaw)
     ahead_x, ahead_y = zmp_forward * c, zmp_forward * s
-    ax, ay = float(soles[0, 0, 3]) + ahead_x, float(soles[0, 1, 3]) + ahead_y
-    bx, by = float(soles[1, 0, 3]) + ahead_x, float(soles[1, 1, 3]) + ahead_y
+    (ax, ay), (bx, by) = ((sole[0] + ahead_x, sole[1] + ahead_y) for sole in soles)
     way_x, way_y = bx - ax, by - ay
     share = ((dcm[0] - ax) * way_x + (dcm[1] - ay) * way_y) / max(way_x**2 + way_y**2, 1e-9)
     share = min(max(share, 0.0), 1.0)

@@ -12,19 +12,21 @@ from tulip_motion.footsteps import Footstep
 from tulip_motion.interface import Side, Support
 
 Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+"""A point or its derivative in plain numbers, since much is reckoned from it."""
 
 
 class FootMotion(NamedTuple):
     """Pose of a sole in odom with its derivatives; the sole stays level.
 
     Attributes:
-        position, velocity, acceleration: (3,) [m], [m/s], [m/s^2].
+        position, velocity, acceleration: (x, y, z) [m], [m/s], [m/s^2].
         yaw, yaw_rate, yaw_acceleration: [rad], [rad/s], [rad/s^2].
     """
 
-    position: Array
-    velocity: Array
-    acceleration: Array
+    position: Vector
+    velocity: Vector
+    acceleration: Vector
     yaw: float
     yaw_rate: float = 0.0
     yaw_acceleration: float = 0.0
@@ -32,7 +34,7 @@ class FootMotion(NamedTuple):
     @staticmethod
     def resting(pose: Pose2D) -> FootMotion:
         """Return a foot that stands on the ground."""
-        return FootMotion(np.array([pose.x, pose.y, 0.0]), np.zeros(3), np.zeros(3), pose.yaw)
+        return FootMotion((pose.x, pose.y, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), pose.yaw)
 
 
 class ComMotion(NamedTuple):
@@ -79,7 +81,7 @@ class Reference(NamedTuple):
         """The other foot as it stands, or None while it swings."""
         if self.support is not Support.DOUBLE:
             return None
-        x, y, _ = self.other.position.tolist()
+        x, y, _ = self.other.position
         return Footstep(self.stance.side.other, Pose2D(x, y, self.other.yaw))
 
 
@@ -117,8 +119,11 @@ class MinimumJerk:
             # The quintic's jerk grows without bound at its end; what is left is below a millimetre.
             self.velocity = self.acceleration = 0.0
             return
-        t = remaining
-        jerk = 60.0 * (target - self.position) / t**3 - 36.0 * self.velocity / t**2 - 9.0 * self.acceleration / t
+        # 60 (target - x) / t^3 - 36 v / t^2 - 9 a / t
+        per_t = 1.0 / remaining
+        jerk = (
+            (60.0 * (target - self.position) * per_t - 36.0 * self.velocity) * per_t - 9.0 * self.acceleration
+        ) * per_t
         self.position += dt * (self.velocity + dt * (self.acceleration / 2.0 + dt * jerk / 6.0))
         self.velocity += dt * (self.acceleration + dt * jerk / 2.0)
         self.acceleration += dt * jerk
@@ -163,7 +168,7 @@ class SwingTrack:
     def follow(self, foot: FootMotion) -> None:
         """Take the foot to be where another path leads it."""
         for axis, *state in zip(self._axes, foot.position, foot.velocity, foot.acceleration, strict=False):
-            axis.position, axis.velocity, axis.acceleration = map(float, state)
+            axis.position, axis.velocity, axis.acceleration = state
         yaw = self._axes[2]
         yaw.position, yaw.velocity, yaw.acceleration = foot.yaw, foot.yaw_rate, foot.yaw_acceleration
 
@@ -171,9 +176,9 @@ class SwingTrack:
         """Return the foot's reference now, with the sole's height [m], its derivative and the second one."""
         x, y, yaw = self._axes
         return FootMotion(
-            np.array([x.position, y.position, z]),
-            np.array([x.velocity, y.velocity, speed]),
-            np.array([x.acceleration, y.acceleration, acceleration]),
+            (x.position, y.position, z),
+            (x.velocity, y.velocity, speed),
+            (x.acceleration, y.acceleration, acceleration),
             yaw.position,
             yaw.velocity,
             yaw.acceleration,

@@ -83,7 +83,7 @@ class GroundTrack:
     def begin(self, estimate: Estimate, position: Point) -> None:
         """Take base_link to be at a place in odom [m], with the feet as they are."""
         self.position = position
-        self._soles, self._base = _seen_from_above(estimate)
+        self._note(estimate)
         self._shares = self._counted(estimate.loads) or (0.5, 0.5)
         self.pivots = [(0.0, 0.0), (0.0, 0.0)]
 
@@ -96,8 +96,9 @@ class GroundTrack:
             acceleration: Of the CoM along the ground, in odom [m/s^2].
         """
         loads, before = estimate.loads, self._shares
-        soles, base = _seen_from_above(estimate)
-        base_way_x, base_way_y = base[0] - self._base[0], base[1] - self._base[1]
+        soles, last_soles, (last_base_x, last_base_y) = estimate.soles, self._soles, self._base
+        self._note(estimate)
+        base_way_x, base_way_y = self._base[0] - last_base_x, self._base[1] - last_base_y
         counted = self._counted(loads)
         if counted is None:
             self._flight += self._dt
@@ -112,8 +113,9 @@ class GroundTrack:
             # The pivot stays, so that base_link goes against the way that the joints show of it. The sole's axes are
             # taken as they are: to first order in their turn, the IMU's noise would add up to millimetres a minute.
             along, across = self.pivots[side]
-            (forward_x, left_x, _, place_x), (forward_y, left_y, _, place_y) = soles[side]
-            (last_forward_x, last_left_x, _, last_x), (last_forward_y, last_left_y, _, last_y) = self._soles[side]
+            (place_x, place_y, _), ((forward_x, left_x, _), (forward_y, left_y, _), _) = soles[side]
+            (last_x, last_y, _), axes = last_soles[side]
+            (last_forward_x, last_left_x, _), (last_forward_y, last_left_y, _), _ = axes
             way_x = place_x - last_x + (forward_x - last_forward_x) * along + (left_x - last_left_x) * across
             way_y = place_y - last_y + (forward_y - last_forward_y) * along + (left_y - last_left_y) * across
             x -= share * (way_x - base_way_x)
@@ -123,11 +125,21 @@ class GroundTrack:
                 self._twist += share * abs(rate) * self._dt
             # How the sole is pressed now says how it moves until the next tick.
             self.pivots[side] = (0.0, 0.0)
-            if loads[side] > self._contact_force:
+            if loads[side] <= self._contact_force:
+                continue
+            if abs(rate) < TWIST_RATE:
+                load, forward, left = estimate.pressures[side]
+                self.pivots[side] = (forward / load, left / load)  # the centre of pressure: a sole at rest has no pivot
+            else:
                 ax, ay = acceleration
                 pushed = (-forward_x * ax - forward_y * ay, -left_x * ax - left_y * ay)
                 self.pivots[side] = pivot(self._cells[side], cells[side].tolist(), pushed, rate)
-        self.position, self._soles, self._base = (x, y), soles, base
+        self.position = (x, y)
+
+    def _note(self, estimate: Estimate) -> None:
+        """Keep where soles and base are, seen from above, to tell how they have moved by the next tick."""
+        x, y, _ = estimate.base_position.tolist()
+        self._soles, self._base = estimate.soles, (x, y)
 
     def _counted(self, loads: tuple[float, float]) -> tuple[float, float] | None:
         """Return how much the left and the right foot count by their loads [N]; None if they carry nothing."""
@@ -144,8 +156,6 @@ def pivot(
 ) -> Point:
     """Return the point of a sole that stays where it is while the sole twists, in its axes [m].
 
-    A sole at rest has none; its centre of pressure is returned.
-
     Args:
         cells: Places of the cells in the sole [m].
         forces: On the cells [N]; not all zero.
@@ -159,8 +169,6 @@ def pivot(
     for force, (cell_x, cell_y) in zip(forces, cells, strict=True):
         x += force * cell_x / load
         y += force * cell_y / load
-    if abs(rate) < TWIST_RATE:
-        return x, y
     # The equation above, turned back by J; friction bears no more than mu F
     bearable = max(GRAVITY * FRICTION, math.hypot(*pushed))
     sense = math.copysign(1.0, rate)
@@ -195,21 +203,9 @@ def carried(
     if before == after:
         return after
     left, right = (
-        Footstep(new.side, Pose2D(new.pose.x + shift[0], new.pose.y + shift[1], _yaw(estimate, new.side)))
+        Footstep(new.side, Pose2D(new.pose.x + shift[0], new.pose.y + shift[1], estimate.sole_pose(new.side).yaw))
         if new == old
         else new
         for old, new in zip(before, after, strict=True)
     )
     return left, right
-
-
-def _yaw(estimate: Estimate, side: int) -> float:
-    sole = estimate.soles[side]
-    return math.atan2(sole[1, 0], sole[0, 0])
-
-
-def _seen_from_above(estimate: Estimate) -> tuple[list[list[list[float]]], Point]:
-    """Return the upper two rows of the transforms of both soles, and (x, y) of base_link [m]."""
-    x, y, _ = estimate.base_position.tolist()
-    soles: list[list[list[float]]] = estimate.soles[:, :2].tolist()
-    return soles, (x, y)

@@ -12,30 +12,24 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tulip_motion.footsteps import Footstep
-from tulip_motion.parameters import MotionParameters
-from tulip_motion.stabilizer import nearest_in_support
+from tulip_motion.stabilizer import SupportArea
 
 
-def turn_for_balance(
-    parameters: MotionParameters, wrench: NDArray[np.float64], stance: Footstep, other: Footstep | None
-) -> tuple[float, float]:
+def turn_for_balance(wrench: NDArray[np.float64], area: SupportArea) -> tuple[float, float]:
     """Return what to add to the torso's angular acceleration about odom's x and y [rad/s^2]; (0, 0) if nothing.
 
     No more is added than what would bring the torso to a lean of `max_lean` instead of upright.
 
     Args:
-        parameters: Of motion control.
         wrench: (6,) force and moment about odom's origin that the planned motion asks of the ground [N], [N m].
-        stance: The foot that stands.
-        other: The other foot if it stands as well, else None.
+        area: Where the ZMP can be.
     """
-    p = parameters
+    p = area.parameters
     _, _, force, moment_x, moment_y, _ = wrench.tolist()
     if force < p.contact_force:
         return 0.0, 0.0  # as good as in the air, where a ZMP means nothing
     zmp = (-moment_y / force, moment_x / force)
-    nearest, _ = nearest_in_support(p, zmp, stance, other)
+    nearest, _ = area.nearest(zmp)
     per_metre = force / p.torso_inertia
     most = p.torso_stiffness * p.max_lean
     about_x, about_y = (nearest[1] - zmp[1]) * per_metre, (zmp[0] - nearest[0]) * per_metre

@@ -15,11 +15,10 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import eigenpy
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.linalg.blas import dsyrk
-from scipy.linalg.lapack import dpotrf, dpotrs
 
 from tulip_description import frames
 from tulip_description.planar import Pose2D
@@ -34,6 +33,8 @@ MAX_POSITION_ERROR = 0.1  # [m] feedback acts on no more: a target that jumps is
 MAX_ORIENTATION_ERROR = 1.0  # [rad] likewise; eq. (11) has no inverse at pi / 2
 TWICE_LEAST_COSINE = 2.0 * math.cos(MAX_ORIENTATION_ERROR)
 SINGULAR_VALUE = 0.03  # of J, below which damping grows; walking at 0.6 m/s stays above 0.048, a kick above 0.040
+LOOK = 4  # [ticks] between looks at the singular value; it was found to fall by 0.0035 meanwhile at most
+NEARLY_SINGULAR = 0.037  # below it every tick has a look
 REPORTED_POSITION_ERROR = 0.03  # [m] walking stays below 0.005, so more means that the target is out of reach
 REPORTED_ORIENTATION_ERROR = 0.15  # [rad]
 LEG_COLUMNS = (slice(0, 6), slice(6, 12))
@@ -44,16 +45,16 @@ class TaskTarget(NamedTuple):
     """Desired task-space state in odom, x_d of the paper.
 
     Attributes:
-        com, com_velocity: (3,) [m], [m/s].
+        com, com_velocity: (x, y, z) [m], [m/s].
         torso_rotation: (3, 3) from base_link to odom.
-        torso_angular_velocity: (3,) [rad/s].
+        torso_angular_velocity: (x, y, z) [rad/s].
         foot: The foot that is not the stance foot.
     """
 
-    com: Array
-    com_velocity: Array
+    com: Sequence[float]
+    com_velocity: Sequence[float]
     torso_rotation: Array
-    torso_angular_velocity: Array
+    torso_angular_velocity: Sequence[float]
     foot: FootMotion
 
 
@@ -127,33 +128,46 @@ def turn_from_yaw(yaw: float, actual: Array) -> Rows:
     )
 
 
-def linear_rate(desired: Array, actual: Array, velocity: Array, gain: float) -> tuple[float, float, float]:
+def linear_rate(
+    desired: Sequence[float], actual: Sequence[float], velocity: Sequence[float], gain: float
+) -> tuple[float, float, float]:
     """Return p_d' + K_p e_p [m/s], the position rows of eq. (10), with e_p no longer than `MAX_POSITION_ERROR`."""
-    ex, ey, ez = np.subtract(desired, actual).tolist()
-    vx, vy, vz = velocity.tolist()
+    (x, y, z), (to_x, to_y, to_z), (vx, vy, vz) = actual, desired, velocity
+    ex, ey, ez = to_x - x, to_y - y, to_z - z
     square = ex * ex + ey * ey + ez * ez
     if square > MAX_POSITION_ERROR**2:
         gain *= MAX_POSITION_ERROR / math.sqrt(square)
     return vx + gain * ex, vy + gain * ey, vz + gain * ez
 
 
-def _distance(a: Array, b: Array) -> float:
-    return float(np.linalg.norm(a - b))
+def _distance(a: Sequence[float], b: Array) -> float:
+    return float(np.linalg.norm(np.subtract(a, b)))
 
 
 def _angle(a: Array, b: Array) -> float:
     return float(np.linalg.norm(pin.log3(a @ b.T)))
 
 
-def _set_lever(block: Array, sign: float, point: Array) -> None:
-    """Write sign * S(point) into a (3, 3) block whose diagonal is zero."""
-    x, y, z = point.tolist()
-    block[0, 1] = -sign * z
-    block[0, 2] = sign * y
-    block[1, 0] = sign * z
-    block[1, 2] = -sign * x
-    block[2, 0] = -sign * y
-    block[2, 1] = sign * x
+def task_of_twists(com: Array, foot: Array) -> Array:
+    """Return (12, 12): rows, what unit twists of the stance leg (6) and of the other leg (6) do to the task velocity.
+
+    A point r of a body with twist (v, w) moves with v - S(r) w. The base moves against the stance leg's twist, and
+    takes CoM, torso and the other foot along; the other leg's twist moves its foot alone. The CoM's own motion in the
+    body comes on top.
+
+    Args:
+        com: (3,) CoM in odom [m].
+        foot: (3,) sole of the foot that is not the stance foot [m].
+    """
+    nothing, one = np.zeros((3, 3)), np.eye(3)
+    return np.block(
+        [
+            [-one, nothing, -one, nothing],
+            [-skew(com), -one, -skew(foot), -one],
+            [nothing, nothing, one, nothing],
+            [nothing, nothing, skew(foot), one],
+        ]
+    )
 
 
 class InverseKinematics:
@@ -163,16 +177,13 @@ class InverseKinematics:
     joint speeds keep to the robot's limits, and `notes` says what is the matter.
     """
 
-    def __init__(
-        self, model: Any, gain_position: float, gain_orientation: float, damping: float, joint_limits: Array
-    ) -> None:
+    def __init__(self, model: Any, gain_position: float, gain_orientation: float, joint_limits: Array) -> None:
         """Make a solver.
 
         Args:
             model: Pinocchio model of the legs with a free flyer at base_link; its speed limits are kept to.
             gain_position: K_p of eq. (10) [1/s].
             gain_orientation: K_o of eq. (10) [1/s].
-            damping: Added to the diagonal of J^T J, always; near singular postures more is added.
             joint_limits: (2, 12) lowest and highest joint angles [rad].
         """
         self.model = model
@@ -180,8 +191,6 @@ class InverseKinematics:
         self.sole_frames = (model.getFrameId(frames.LEFT_SOLE), model.getFrameId(frames.RIGHT_SOLE))
         self._gain_position = gain_position
         self._gain_orientation = gain_orientation
-        self._damping = damping
-        self._damping_matrix = np.asfortranarray(damping * np.eye(12))
         self._joint_limits = joint_limits
         self._per_speed_limit = 1.0 / model.velocityLimit[6:]
         self.configuration = pin.neutral(model)
@@ -203,26 +212,34 @@ class InverseKinematics:
         """(6, 6) each: what the left and right leg's joint speeds add to the foot's twist about odom's origin."""
         self._com_of_joints = data.Jcom[:, 6:].T
         self._zero = np.zeros(model.nv)
-        # What unit twists of the stance leg and of the other leg do to the task, (6, 12) each and transposed. The base
-        # moves against the stance leg's twist, and takes CoM, torso and the other foot along.
-        self._task_of_stance = np.hstack([np.vstack([-np.eye(3), np.zeros((3, 3))]), -np.eye(6)[:, 3:]] * 2)
-        self._task_of_other = np.hstack([np.zeros((6, 6)), np.eye(6)])
-        self._stance_levers = (self._task_of_stance[3:, :3], self._task_of_stance[3:, 6:9])
-        self._other_lever = self._task_of_other[3:, 6:9]
+        # `task_of_twists` is linear in (CoM, foot, 1): one product fills it in.
+        self._places = np.array((0.0,) * 6 + (1.0,))
+        self._place_of_com, self._place_of_foot = self._places[:3], self._places[3:6]
+        at_rest = task_of_twists(np.zeros(3), np.zeros(3))
+        units = [task_of_twists(unit[:3], unit[3:]) - at_rest for unit in np.eye(6)]
+        self._task_of_places = np.stack([*units, at_rest], axis=-1).reshape(144, 7)
+        tasks = np.empty((12, 12))
+        self._tasks = tasks.reshape(144)
+        self._task_of_stance, self._task_of_other = tasks[:6], tasks[6:]
+        self._drift = np.zeros(12)  # of the task, without joint accelerations; the torso has none of its own
+        self._drift_of_com, self._drift_of_foot = self._drift[:3], self._drift[6:]
         self._jacobian_transposed = np.zeros((12, 12))
         self._jacobian = self._jacobian_transposed.T
         self._leg_rows = (self._jacobian_transposed[:6], self._jacobian_transposed[6:])
         self._com_rows = self._jacobian_transposed[:, :3]
-        self._factor = np.eye(12)
+        # Eigen's factorizations, which take less time than those of LAPACK for so few numbers.
+        self._lu, self._lu_transposed = eigenpy.PartialPivLU(12), eigenpy.PartialPivLU(12)
+        self._damped = eigenpy.LLT(12)
         self.twist_to_base = np.eye(6)
         """(6, 6) from a twist about odom's origin to the base's velocity in its own axes."""
         self._base_of_stance = np.zeros((6, 6))
-        self._weakest = np.full(12, 1.0 / math.sqrt(12.0))
-        self._singular_value = 1.0
+        self._weakest = np.full(12, math.nan)  # not known yet
+        self._singular_value = 0.0
         self._rate = np.zeros(12)
         self._target: TaskTarget | None = None
         self._anchor_pose: Pose2D | None = None
         self._anchor = pin.SE3.Identity()
+        self._updates = 0
 
     def reset(self, base_rotation: Array, base_position: Array, joint_positions: Array) -> None:
         """Set the posture that the integration goes on from."""
@@ -230,6 +247,7 @@ class InverseKinematics:
         self.configuration[3:7] = pin.Quaternion(base_rotation).coeffs()
         self.configuration[7:] = joint_positions
         self.velocity[:] = 0.0
+        self._weakest[:], self._singular_value = math.nan, 0.0
 
     @property
     def jacobian(self) -> Array:
@@ -288,13 +306,16 @@ class InverseKinematics:
     def update_jacobian(self, stance: Side) -> None:
         """Compute the kinematics of the present posture, and J for a stance foot."""
         model, data = self.model, self.data
-        self._stance = stance
+        if stance is not self._stance:
+            self._stance, self._singular_value = stance, 0.0
         # One pass gives placements, CoM, its Jacobian, and the joints' twists about odom's origin (data.J).
         pin.jacobianCenterOfMass(model, data, self.configuration, False)
         for frame in self.sole_frames:
             pin.updateFramePlacement(model, data, frame)
-        self._update_levers()
         other, twists, rows = stance.other, self.leg_twists, self._leg_rows
+        self._place_of_com[:] = self._com
+        self._place_of_foot[:] = self.sole_positions[other]
+        np.dot(self._task_of_places, self._places, out=self._tasks)
         np.dot(twists[stance].T, self._task_of_stance, out=rows[stance])
         np.dot(twists[other].T, self._task_of_other, out=rows[other])
         np.add(self._com_rows, self._com_of_joints, out=self._com_rows)
@@ -308,17 +329,17 @@ class InverseKinematics:
         foot, other = target.foot, self._stance.other
         k_p, k_o = self._gain_position, self._gain_orientation
         self._rate[:] = (
-            *linear_rate(target.com, self._com, target.com_velocity, k_p),
+            *linear_rate(target.com, self._com.tolist(), target.com_velocity, k_p),
             *angular_rate(
-                self._base_rotation.dot(target.torso_rotation.T).tolist(), target.torso_angular_velocity.tolist(), k_o
+                self._base_rotation.dot(target.torso_rotation.T).tolist(), target.torso_angular_velocity, k_o
             ),
-            *linear_rate(foot.position, self.sole_positions[other], foot.velocity, k_p),
+            *linear_rate(foot.position, self.sole_positions[other].tolist(), foot.velocity, k_p),
             *angular_rate(turn_from_yaw(foot.yaw, self._sole_rotations[other]), (0.0, 0.0, foot.yaw_rate), k_o),
         )
-        joints = self._damped_solve(self._rate)
-        fastest = max(map(abs, (joints * self._per_speed_limit).tolist()))
-        if fastest > 1.0:
-            joints /= fastest
+        joints = self._solve(self._rate)
+        shares = joints * self._per_speed_limit
+        if shares.dot(shares) > 1.0:  # else none of them is greater than 1
+            joints /= max(1.0, np.abs(shares).max())
         self._set_joint_velocities(joints)
 
     def solve_acceleration(self, task_acceleration: Array) -> Array:
@@ -333,11 +354,11 @@ class InverseKinematics:
         stance_drift = pin.getFrameAcceleration(model, data, frames_[stance], pin.WORLD).vector
         foot_drift = pin.getFrameClassicalAcceleration(model, data, frames_[stance.other], pin.LOCAL_WORLD_ALIGNED)
         # The base makes up for the drift of the stance sole, and takes the task along.
-        wanted = task_acceleration - self._task_of_stance.T.dot(stance_drift)
-        wanted[:3] -= self._com_drift
-        wanted[6:] -= foot_drift.vector
+        self._drift_of_com[:] = self._com_drift
+        self._drift_of_foot[:] = foot_drift.vector
+        wanted = task_acceleration - self._task_of_stance.T.dot(stance_drift) - self._drift
         generalized = np.empty(18)
-        joints = generalized[6:] = self._damped_solve(wanted)
+        joints = generalized[6:] = self._solve(wanted)
         stance_twist = stance_drift + self.leg_twists[stance].dot(joints[LEG_COLUMNS[stance]])
         generalized[:6] = -self.twist_to_base.dot(stance_twist)
         return generalized
@@ -345,7 +366,7 @@ class InverseKinematics:
     def integrate(self, dt: float, stance: Pose2D) -> None:
         """Advance q_d by dt [s], eq. (7), and put the stance sole back where it stands, in odom.
 
-        The sole drifts by the integration's second-order error only, a micrometre a tick, which one
+        The sole drifts by the integration's second-order error only, some micrometres a tick, which one
         correction of the base removes.
         """
         if stance is not self._anchor_pose:  # the same object for a whole step
@@ -363,34 +384,39 @@ class InverseKinematics:
             # A joint that is at its end rests there.
             self._set_joint_velocities(np.where(joints == wanted, self._joint_velocity, 0.0))
 
-    def _update_levers(self) -> None:
-        """Enter where CoM and other foot lie: a point r of a body with twist (v, w) moves with v - S(r) w."""
-        com, foot = self._com, self.sole_positions[self._stance.other]
-        # Transposed, and for the stance leg with the opposite sign: S(r) becomes its own negative twice.
-        _set_lever(self._stance_levers[0], -1.0, com)
-        _set_lever(self._stance_levers[1], -1.0, foot)
-        _set_lever(self._other_lever, 1.0, foot)
-
     def _factorize(self) -> None:
-        """Factorize J^T J + damping, once for velocities and accelerations, and see how singular it is.
-
-        One inverse iteration a tick, begun from the last tick's result, keeps `_weakest` on the direction of joint
-        space that moves the task least, and gives its singular value (Maciejewski and Klein, 1988).
-        """
-        # BLAS and LAPACK without scipy's checks, which cost more than the work. Damped, it cannot fail.
-        self._factor, _ = dpotrf(dsyrk(1.0, self._jacobian, beta=1.0, c=self._damping_matrix, trans=1), clean=0)
-        grown = dpotrs(self._factor, self._weakest)[0]
-        growth = math.sqrt(grown.dot(grown))
-        np.multiply(grown, 1.0 / growth, out=self._weakest)
-        square = max(1.0 / growth - self._damping, 0.0)
-        self._singular_value = math.sqrt(square)
+        """Factorize J, once for velocities and accelerations, and J^T J + damping where J is nearly singular."""
+        self._lu.compute(self._jacobian)
+        self._updates += 1
+        if self._updates % LOOK == 0 or self._singular_value < NEARLY_SINGULAR:
+            self._look_for_singularity()
         if self._singular_value < SINGULAR_VALUE:
             # From nothing at the threshold to SINGULAR_VALUE^2 where the direction is lost.
-            damping = (self._damping + SINGULAR_VALUE**2 - square) * np.eye(12)
-            self._factor, _ = dpotrf(dsyrk(1.0, self._jacobian, beta=1.0, c=damping, trans=1), clean=0)
+            damping = SINGULAR_VALUE**2 - self._singular_value**2
+            self._damped.compute(self._jacobian_transposed.dot(self._jacobian) + damping * np.eye(12))
 
-    def _damped_solve(self, rate: Array) -> Array:
-        solution: Array = dpotrs(self._factor, self._jacobian_transposed.dot(rate))[0]
+    def _look_for_singularity(self) -> None:
+        """Update the smallest singular value of J, and the direction of joint space that moves the task least.
+
+        One inverse iteration, begun from the last result, keeps up with both (Maciejewski and Klein, 1988). Without a
+        last result, or at a posture that is singular altogether, all singular values are computed.
+        """
+        self._lu_transposed.compute(self._jacobian_transposed)
+        grown = self._lu.solve(self._lu_transposed.solve(self._weakest))
+        growth = math.sqrt(grown.dot(grown))
+        if math.isfinite(growth):
+            np.multiply(grown, 1.0 / growth, out=self._weakest)
+            self._singular_value = math.sqrt(1.0 / growth)
+        else:
+            _, values, directions = np.linalg.svd(self._jacobian)
+            self._weakest[:], self._singular_value = directions[-1], float(values[-1])
+
+    def _solve(self, rate: Array) -> Array:
+        """Return J^-1 times a (12,) task velocity or acceleration, damped where J is nearly singular."""
+        if self._singular_value < SINGULAR_VALUE:
+            solution: Array = self._damped.solve(self._jacobian_transposed.dot(rate))
+        else:
+            solution = self._lu.solve(rate)
         return solution
 
     def _set_joint_velocities(self, joints: Array) -> None:

@@ -162,10 +162,10 @@ class Kick:
     def _turn_torso(self, foot: FootMotion, dt: float) -> tuple[float, float]:
         """Turn the torso against the foot's motion about the stance foot; return its rate and acceleration."""
         gain = -self._parameters.kick_torso_turn
-        lever = foot.position[:2] - (self._stance.pose.x, self._stance.pose.y)
-        rate = gain * float(lever[0] * foot.velocity[1] - lever[1] * foot.velocity[0])
+        x, y = foot.position[0] - self._stance.pose.x, foot.position[1] - self._stance.pose.y
+        rate = gain * (x * foot.velocity[1] - y * foot.velocity[0])
         self._torso_yaw += dt * rate
-        return rate, gain * float(lever[0] * foot.acceleration[1] - lever[1] * foot.acceleration[0])
+        return rate, gain * (x * foot.acceleration[1] - y * foot.acceleration[0])
 
     def _begin_to_stand(self) -> None:
         """Bring the ZMP from where it is now back between the feet."""

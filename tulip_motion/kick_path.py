@@ -139,15 +139,15 @@ class FootPath:
             time -= piece.duration
         last = self._pieces[-1]
         end = last.evaluate(last.duration)
-        down = np.array([0.0, 0.0, -self._landing_speed])
-        return FootMotion(end.position + time * down, down, np.zeros(3), end.yaw)
+        x, y, z = end.position
+        down = -self._landing_speed
+        return FootMotion((x, y, z + time * down), (0.0, 0.0, down), (0.0, 0.0, 0.0), end.yaw)
 
 
 def foot_motion(position: Array, velocity: Array, acceleration: Array) -> FootMotion:
     """Return a foot's reference from (4,) x, y, z, yaw and their derivatives."""
-    return FootMotion(
-        position[:3], velocity[:3], acceleration[:3], float(position[3]), float(velocity[3]), float(acceleration[3])
-    )
+    (x, y, z, yaw), (vx, vy, vz, rate), (ax, ay, az, bend) = position.tolist(), velocity.tolist(), acceleration.tolist()
+    return FootMotion((x, y, z), (vx, vy, vz), (ax, ay, az), yaw, rate, bend)
 
 
 def _four(foot: FootMotion, order: int) -> Array:

@@ -188,15 +188,19 @@ class MirroredStep:
         arm = (c * forward - s * left, s * forward + c * left)  # from the sole's frame to its pivot
         turned = (-arm[1], arm[0])
         places = ((self.before.x, self.after.x), (self.before.y, self.after.y))
-        position, velocity, acceleration = np.empty(3), np.empty(3), np.empty(3)
+        motions = []
         for i, (mirrored, (before, after)) in enumerate(zip(self._mirrored(time), places, strict=True)):
             beside = before - 2.0 * self.start[i].position
             led = after - 2.0 * self.end[i].position - beside
-            position[i] = mirrored[0] + beside + progress * led - arm[i]
-            velocity[i] = mirrored[1] + rate * led - yaw_rate * turned[i]
-            acceleration[i] = mirrored[2] + bend * led - yaw_bend * turned[i] + yaw_rate**2 * arm[i]
-        position[2], velocity[2], acceleration[2] = self.shape.vertical(time)
-        return FootMotion(position, velocity, acceleration, yaw, yaw_rate, yaw_bend)
+            motions.append(
+                (
+                    mirrored[0] + beside + progress * led - arm[i],
+                    mirrored[1] + rate * led - yaw_rate * turned[i],
+                    mirrored[2] + bend * led - yaw_bend * turned[i] + yaw_rate**2 * arm[i],
+                )
+            )
+        (x, vx, ax), (y, vy, ay), (z, vz, az) = *motions, self.shape.vertical(time)
+        return FootMotion((x, y, z), (vx, vy, vz), (ax, ay, az), yaw, yaw_rate, yaw_bend)
 
     def _mirrored(self, time: float) -> list[tuple[float, float, float]]:
         """Return 2 c(t) with its derivatives along x and y, led from rest and to rest in the settling time."""

@@ -37,8 +37,8 @@ from tulip_motion.odometry import DeadReckoning
 from tulip_motion.paper_gait import PaperGait
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import reach
-from tulip_motion.stabilizer import Balance, stabilize
-from tulip_motion.state_estimator import Estimate, StateEstimator
+from tulip_motion.stabilizer import Balance, SupportArea, stabilize
+from tulip_motion.state_estimator import Estimate, StateEstimator, centre_of_pressure
 from tulip_motion.tracking import Order, StepInProgress, Tracking
 from tulip_motion.walking import Walking, must_step
 from tulip_motion.walking_kick import WalkingKick
@@ -79,6 +79,7 @@ class Motion:
         self._ground = GroundTrack(p, [foot.cells for foot in robot.feet])
         self._shift = (0.0, 0.0)  # [m] of base_link in odom by slips since the feet were last put where they are
         self._falls = FallDetector(p)
+        self._area: SupportArea | None = None
 
     @property
     def mode(self) -> MotionMode:
@@ -221,9 +222,9 @@ class Motion:
             tracking.com_velocity_planned if reference else np.full(3, np.nan),
             np.array(estimate.dcm),
             planned,
-            estimate.zmp,
+            centre_of_pressure(estimate, self._parameters.contact_force),
             np.array(self._balance.zmp) if reference else np.full(2, np.nan),
-            estimate.soles,
+            np.array([sole.transform for sole in estimate.soles]),
             estimate.joint_positions,
             tracking.joint_positions,
             estimate.joint_velocities,
@@ -311,7 +312,9 @@ class Motion:
                 self._estimator.restart()
                 self._mode, self._reason, self._gait, self._started = MotionMode.STAND, "", None, False
             return
-        fall = self._falls.is_falling(estimate.base_rotation, estimate.angular_velocity, estimate.dcm, estimate.soles)
+        left, right = estimate.soles
+        places = (left.position, right.position)
+        fall = self._falls.is_falling(estimate.base_rotation, estimate.angular_velocity, estimate.dcm, places)
         if fall:
             self._fall(fall)
         elif wanted is WalkMode.LIMP:
@@ -359,7 +362,7 @@ class Motion:
         p = self._parameters
         if self._mode is MotionMode.LIMP:
             return estimate.tilt < p.upright_tilt and min(estimate.loads) > p.contact_force
-        height = float(estimate.base_position[2] - min(estimate.soles[:, 2, 3]))
+        height = float(estimate.base_position[2]) - min(sole.position[2] for sole in estimate.soles)
         return self._falls.is_upright(estimate.base_rotation, estimate.angular_velocity, height, estimate.loads)
 
     def _advance_gait(self, estimate: Estimate) -> Reference:
@@ -403,9 +406,12 @@ class Motion:
         """Return ZMP and CMP that bring the measured DCM back to the planned one, within what the body can do."""
         # In open loop nothing is corrected: the plan's own DCM leaves the plan's ZMP.
         dcm = estimate.dcm if reference.com is None else reference.dcm
-        return stabilize(
-            self._parameters, reference.zmp, reference.dcm, dcm, reference.stance, reference.other_standing
-        )
+        stance, other = reference.stance, reference.other_standing
+        area = self._area
+        # A foot that stands alone is the same all through a step.
+        if area is None or area.stance is not stance or area.way is not None or other is not None:
+            area = self._area = SupportArea.of(self._parameters, stance, other)
+        return stabilize(area, reference.zmp, reference.dcm, dcm)
 
     def _send(self, order: Order) -> JointCommand:
         """Number an order of the joints, and stamp it with the time of the sensors that it answers."""

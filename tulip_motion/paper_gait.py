@@ -260,14 +260,12 @@ def sideways_limit(shape: StepShape, width: float, least: float) -> float:
 
 def moved(foot: FootMotion, frame: Pose2D) -> FootMotion:
     """Return a foot's motion, given in a frame at rest, in the frame's parent."""
-    rotation = np.eye(3)
-    rotation[:2, :2] = frame.rotation()
-    position = rotation @ foot.position
-    position[:2] += (frame.x, frame.y)
+    c, s = math.cos(frame.yaw), math.sin(frame.yaw)
+    (x, y, z), (vx, vy, vz), (ax, ay, az) = foot.position, foot.velocity, foot.acceleration
     return FootMotion(
-        position,
-        rotation @ foot.velocity,
-        rotation @ foot.acceleration,
+        (frame.x + c * x - s * y, frame.y + s * x + c * y, z),
+        (c * vx - s * vy, s * vx + c * vy, vz),
+        (c * ax - s * ay, s * ax + c * ay, az),
         frame.yaw + foot.yaw,
         foot.yaw_rate,
         foot.yaw_acceleration,

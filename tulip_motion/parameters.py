@@ -150,7 +150,6 @@ class MotionParameters:
     # Inverse kinematics, eq. (10)
     clik_gain_position: float = 20.0  # [1/s] K_p
     clik_gain_orientation: float = 20.0  # [1/s] K_o
-    clik_damping: float = 1e-6  # keeps the solve finite at the straight knee
 
     # Feedforward, eq. (14): "full", or "gravity" as in 2012, at rest without acceleration, or "none"
     feedforward: str = "full"

@@ -27,6 +27,32 @@ from tulip_motion.parameters import MotionParameters
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]
+Point2D = tuple[float, float]
+
+
+class Sole(NamedTuple):
+    """Where a sole is, in odom; plain numbers, since every tick reckons with them.
+
+    Attributes:
+        position: (x, y, z) [m].
+        axes: 3 x 3 from the sole's axes to odom's, by rows.
+    """
+
+    position: Sequence[float]
+    axes: Sequence[Sequence[float]]
+
+    @property
+    def pose(self) -> Pose2D:
+        """As seen from above."""
+        (c, _, _), (s, _, _), _ = self.axes
+        return Pose2D(self.position[0], self.position[1], math.atan2(s, c))
+
+    @property
+    def transform(self) -> Array:
+        """(4, 4) from the sole to odom."""
+        transform = np.eye(4)
+        transform[:3, :3], transform[:3, 3] = self.axes, self.position
+        return transform
 
 
 class Estimate(NamedTuple):
@@ -40,9 +66,9 @@ class Estimate(NamedTuple):
         joint_positions, joint_velocities: (12,) [rad], [rad/s].
         com, com_velocity: (3,) smoothed by the observer [m], [m/s].
         dcm: (x, y) of the divergent component of motion, c + Tc c' [m]; plain numbers, since much is reckoned from it.
-        soles: (2, 4, 4) transforms of the soles.
+        soles: The left and the right one.
         sole_yaw_rates: At which the left and the right sole turn, by gyro and joints [rad/s]; 0 in the air.
-        zmp: (2,) measured centre of pressure [m]; NaN without contact.
+        pressures: On the left and right sole: force [N], and the force times its centre, forward and left [N m].
         loads: Vertical force on the left and right sole [N].
         tilt: Angle between the torso and the vertical [rad].
     """
@@ -56,15 +82,15 @@ class Estimate(NamedTuple):
     com: Array
     com_velocity: Array
     dcm: tuple[float, float]
-    soles: Array
+    soles: tuple[Sole, Sole]
     sole_yaw_rates: tuple[float, float]
-    zmp: Array
+    pressures: Sequence[Point]
     loads: tuple[float, float]
     tilt: float
 
     def sole_pose(self, side: Side) -> Pose2D:
         """Return where a sole is, seen from above."""
-        return planar_pose(self.soles[side])
+        return self.soles[side].pose
 
 
 class StateEstimator:
@@ -83,7 +109,7 @@ class StateEstimator:
         self._time_constant = time_constant(parameters.com_height)
         self._model = model
         data = self._data = model.createData()
-        self._soles = (model.getFrameId(frames.LEFT_SOLE), model.getFrameId(frames.RIGHT_SOLE))
+        self._sole_frames = (model.getFrameId(frames.LEFT_SOLE), model.getFrameId(frames.RIGHT_SOLE))
         self._cells = cell_positions.tolist()
         self._imu_rotation = imu_rotation
         self._imu_to_base = quaternion_conjugate(tuple(pin.Quaternion(imu_rotation).coeffs().tolist()))
@@ -92,10 +118,22 @@ class StateEstimator:
         # Views into Pinocchio's data, made once: making one takes as long as what is done with it.
         self._model_com, self._model_com_velocity = data.com[0], data.vcom[0]
         self._base_rotation = data.oMi[1].rotation
-        self._heading_offset: float | None = None
+        soles = [data.oMf[frame] for frame in self._sole_frames]
+        self._soles = tuple((sole.translation, sole.rotation) for sole in soles)
+        self._heading_offset: Quaternion | None = None
         self._tilt_bias = (0.0, 0.0)  # [rad] of the IMU about the x and y axis of base_link
         self._begins = True
-        self._com, self._com_velocity = np.zeros(3), np.zeros(3)
+        dt, position_share = parameters.control_period, parameters.control_period * parameters.observer_position_gain
+        velocity_share = dt * parameters.observer_velocity_gain
+        self._observer = np.array(
+            (
+                (1.0 - position_share, dt, position_share, 0.0, 0.0),
+                (0.0, 1.0 - velocity_share, 0.0, velocity_share, dt),
+            )
+        )
+        # What the observer's next state is made of: CoM, its velocity, both as measured, acceleration; (3,) each.
+        self._observed = np.zeros((5, 3))
+        self._com_state, self._measured_com, self._measured_velocity = (self._observed[i] for i in (slice(2), 2, 3))
         self.anchors: list[Pose2D] = [Pose2D(), Pose2D()]
         """Where the left and the right sole stand, or were put down last, in odom."""
         self.shift = (0.0, 0.0)
@@ -122,54 +160,58 @@ class StateEstimator:
         """
         q, v = self._configuration, self._velocity
         q[3:7] = self._attitude(sensors)
-        q[7:] = sensors.joint_positions[:12]
+        joint_positions, joint_velocities = sensors.joint_positions[:12], sensors.joint_velocities[:12]
+        q[7:] = joint_positions
         v[3:6] = self._imu_rotation.dot(sensors.imu_angular_velocity)
-        v[6:] = sensors.joint_velocities[:12]
+        v[6:] = joint_velocities
         model, data = self._model, self._data
         # The base stays at the origin and at rest: where it is and how it moves follows from the feet.
         pin.centerOfMass(model, data, q, v, False)
-        soles = np.empty((2, 4, 4))
-        for side, frame in enumerate(self._soles):
-            soles[side] = pin.updateFramePlacement(model, data, frame).homogeneous
+        left_frame, right_frame = self._sole_frames
+        pin.updateFramePlacement(model, data, left_frame)
+        pin.updateFramePlacement(model, data, right_frame)
+        (left_place, left_axes), (right_place, right_axes) = self._soles
+        left = Sole(left_place.tolist(), left_axes.tolist())
+        right = Sole(right_place.tolist(), right_axes.tolist())
         if self._begins:
-            self._begin(soles)
-        pressures = [_pressure(*pair) for pair in zip(sensors.foot_cells.tolist(), self._cells, strict=True)]
+            self._begin(left.pose, right.pose)
+        cells_left, cells_right = sensors.foot_cells.tolist()
+        pressures = (_pressure(cells_left, self._cells[0]), _pressure(cells_right, self._cells[1]))
         loads = (pressures[0][0], pressures[1][0])
-        position, velocity, yaw_rates = self._from_feet(left_weight, pressures, loads)
+        position, velocity, yaw_rates = self._from_feet(left_weight, (left, right), pressures, loads)
         base_position, base_velocity = np.array(position), np.array(velocity)
-        soles[:, :3, 3] += base_position
         rotation = self._base_rotation.copy()
         if left_weight in (0.0, 1.0):
-            self._learn_tilt_bias(soles[Side.LEFT if left_weight == 1.0 else Side.RIGHT], rotation)
-        self._observe(base_position, base_velocity, self._felt(acceleration, loads))
+            self._learn_tilt_bias(left if left_weight == 1.0 else right, rotation)
+        com, com_velocity, dcm = self._observe(base_position, base_velocity, self._felt(acceleration, loads))
         return Estimate(
             base_position,
             rotation,
             base_velocity,
             rotation.dot(v[3:6]),
-            q[7:].copy(),
-            v[6:].copy(),
-            self._com,
-            self._com_velocity,
-            self._dcm(),
-            soles,
+            joint_positions,
+            joint_velocities,
+            com,
+            com_velocity,
+            dcm,
+            (_moved(left, position), _moved(right, position)),
             yaw_rates,
-            self._centre_of_pressure(pressures, soles),
+            pressures,
             loads,
-            math.acos(min(max(rotation[2, 2], -1.0), 1.0)),
+            math.acos(min(max(rotation.item(8), -1.0), 1.0)),
         )
 
     def _attitude(self, sensors: Sensors) -> Quaternion:
         """Return the attitude of base_link; its heading counts from the one at the start."""
         attitude = quaternion_product(tuple(sensors.imu_orientation.tolist()), self._imu_to_base)
         if self._heading_offset is None:
-            self._heading_offset = -quaternion_yaw(attitude)
-        half = 0.5 * self._heading_offset
-        turned = quaternion_product((0.0, 0.0, math.sin(half), math.cos(half)), attitude)
+            half = -0.5 * quaternion_yaw(attitude)
+            self._heading_offset = (0.0, 0.0, math.sin(half), math.cos(half))
+        turned = quaternion_product(self._heading_offset, attitude)
         x, y = self._tilt_bias
         return quaternion_product(turned, (-0.5 * x, -0.5 * y, 0.0, math.sqrt(1.0 - 0.25 * (x * x + y * y))))
 
-    def _learn_tilt_bias(self, sole: Array, rotation: Array) -> None:
+    def _learn_tilt_bias(self, sole: Sole, rotation: Array) -> None:
         """Take part of the tilt that a foot alone on level ground seems to have for the IMU's own.
 
         A mounting error of some milliradians would lean the torso, and ask the ankles for angles that the ground does
@@ -177,15 +219,15 @@ class StateEstimator:
         """
         p = self._parameters
         share, most = p.control_period / p.imu_bias_time, p.imu_bias_limit
-        about_x, about_y = -float(sole[1, 2]), float(sole[0, 2])
-        c, s = float(rotation[0, 0]), float(rotation[1, 0])
+        (_, _, about_y), (_, _, minus_about_x), _ = sole.axes
+        about_x, c, s = -minus_about_x, rotation.item(0), rotation.item(3)
         x, y = self._tilt_bias
         x += share * (c * about_x + s * about_y)
         y += share * (c * about_y - s * about_x)
         self._tilt_bias = (min(max(x, -most), most), min(max(y, -most), most))
 
     def _from_feet(
-        self, left_weight: float, pressures: Sequence[Point], loads: tuple[float, float]
+        self, left_weight: float, soles: tuple[Sole, Sole], pressures: Sequence[Point], loads: tuple[float, float]
     ) -> tuple[Point, Point, tuple[float, float]]:
         """Return position [m] and velocity [m/s] of the base for which the feet that carry stay where they stand.
 
@@ -193,6 +235,7 @@ class StateEstimator:
 
         Args:
             left_weight: As of `update`.
+            soles: With the base at the origin.
             pressures: Of the left and right sole, see `_pressure`.
             loads: Vertical force on the left and right sole [N].
         """
@@ -202,15 +245,13 @@ class StateEstimator:
             carries = loads[side] > self._parameters.contact_force
             if weight == 0.0 and not carries:
                 continue
-            motion = pin.getFrameVelocity(self._model, self._data, self._soles[side], pin.LOCAL_WORLD_ALIGNED)
+            motion = pin.getFrameVelocity(self._model, self._data, self._sole_frames[side], pin.LOCAL_WORLD_ALIGNED)
             ux, uy, uz, wx, wy, wz = motion.vector.tolist()
             rates[side] = wz
             if weight == 0.0:
                 continue
-            place = self._data.oMf[self._soles[side]]
-            px, py, pz = place.translation.tolist()
+            (px, py, pz), ((xx, xy, _), (yx, yy, _), (zx, zy, _)) = soles[side]
             if carries:
-                (xx, xy, _), (yx, yy, _), (zx, zy, _) = place.rotation.tolist()
                 load, forward, left = pressures[side]
                 forward, left = forward / load, left / load
                 rx, ry, rz = xx * forward + xy * left, yx * forward + yy * left, zx * forward + zy * left
@@ -229,11 +270,9 @@ class StateEstimator:
             vz -= weight * uz
         return (x, y, z), (vx, vy, vz), (rates[0], rates[1])
 
-    def _begin(self, soles: Array) -> None:
+    def _begin(self, left: Pose2D, right: Pose2D) -> None:
         """Set the anchors such that the left foot stays where it was believed to be, the right beside it."""
-        left = planar_pose(soles[Side.LEFT])
         keep = self.anchors[Side.LEFT]
-        right = planar_pose(soles[Side.RIGHT])
         if keep == Pose2D():
             keep = left
         self.anchors = [Pose2D(keep.x, keep.y, left.yaw), keep_distance(keep, left, right)]
@@ -243,40 +282,42 @@ class StateEstimator:
         in_flight = loads[0] + loads[1] < self._parameters.contact_force
         return np.array((0.0, 0.0, -GRAVITY)) if in_flight else acceleration
 
-    def _observe(self, position: Array, velocity: Array, acceleration: Array) -> None:
-        """Predict the CoM with the commanded acceleration and pull it to the measured one.
+    def _observe(self, position: Array, velocity: Array, acceleration: Array) -> tuple[Array, Array, Point2D]:
+        """Predict the CoM with the commanded acceleration and pull it to the measured one; return also its DCM.
+
+        The gains times the control period, as shares, stand in `_observer`.
 
         Args:
             position: (3,) of the base [m]; the model's CoM counts from there.
             velocity: (3,) of the base [m/s].
             acceleration: (3,) of the CoM, as commanded [m/s^2].
         """
-        p, dt = self._parameters, self._parameters.control_period
-        measured = self._model_com + position
+        observed = self._observed
+        np.add(self._model_com, position, out=self._measured_com)
         if self._begins:
             self._begins = False
-            self._com, self._com_velocity = measured, np.zeros(3)
-            return
-        com, speed = self._com, self._com_velocity
-        self._com = com + dt * (speed + p.observer_position_gain * (measured - com))
-        lag = self._model_com_velocity + velocity - speed
-        self._com_velocity = speed + dt * (acceleration + p.observer_velocity_gain * lag)
+            state = np.array((self._measured_com, (0.0, 0.0, 0.0)))
+        else:
+            np.add(self._model_com_velocity, velocity, out=self._measured_velocity)
+            observed[4] = acceleration
+            state = self._observer.dot(observed)
+        self._com_state[:] = state
+        (x, y, _), (vx, vy, _) = state.tolist()
+        return state[0], state[1], (x + self._time_constant * vx, y + self._time_constant * vy)
 
-    def _dcm(self) -> tuple[float, float]:
-        (x, y, _), (vx, vy, _) = self._com.tolist(), self._com_velocity.tolist()
-        return x + self._time_constant * vx, y + self._time_constant * vy
 
-    def _centre_of_pressure(self, pressures: Sequence[Point], soles: Array) -> Array:
-        """Return where the cells' forces act together, seen from above."""
-        total = pressures[0][0] + pressures[1][0]
-        if total < self._parameters.contact_force:
-            return np.full(2, np.nan)
-        x = y = 0.0
-        for (load, forward, left), sole in zip(pressures, soles[:, :2].tolist(), strict=True):
-            (xx, xy, _, px), (yx, yy, _, py) = sole
-            x += load * px + xx * forward + xy * left
-            y += load * py + yx * forward + yy * left
-        return np.array((x / total, y / total))
+def centre_of_pressure(estimate: Estimate, contact_force: float) -> Array:
+    """Return (2,) where the cells' forces act together, in odom [m]; NaN when they add up to less than a force [N]."""
+    total = sum(estimate.loads)
+    if total < contact_force:
+        return np.full(2, np.nan)
+    x = y = 0.0
+    for (load, forward, left), ((px, py, _), ((xx, xy, _), (yx, yy, _), _)) in zip(
+        estimate.pressures, estimate.soles, strict=True
+    ):
+        x += load * px + xx * forward + xy * left
+        y += load * py + yx * forward + yy * left
+    return np.array((x / total, y / total))
 
 
 def _pressure(forces: Sequence[float], places: Sequence[Sequence[float]]) -> Point:
@@ -291,10 +332,10 @@ def _pressure(forces: Sequence[float], places: Sequence[Sequence[float]]) -> Poi
     return a + b + c + d, a * ax + b * bx + c * cx + d * dx, a * ay + b * by + c * cy + d * dy
 
 
-def planar_pose(transform: Array) -> Pose2D:
-    """Return where a (4, 4) transform lies on the ground, with its yaw."""
-    (c, _, _, x), (s, _, _, y) = transform[:2].tolist()
-    return Pose2D(x, y, math.atan2(s, c))
+def _moved(sole: Sole, way: Point) -> Sole:
+    """Return a sole moved by a way [m]."""
+    x, y, z = sole.position
+    return Sole((x + way[0], y + way[1], z + way[2]), sole.axes)
 
 
 def keep_distance(anchor: Pose2D, measured: Pose2D, other: Pose2D) -> Pose2D:

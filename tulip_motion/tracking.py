@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from tulip_description.robot import Robot
 from tulip_motion.feedforward import distance_share, feedforward, inverse_dynamics
 from tulip_motion.footsteps import Footstep
-from tulip_motion.gait import Reference, sole_point
+from tulip_motion.gait import Reference
 from tulip_motion.hip_strategy import turn_for_balance
-from tulip_motion.interface import Side
 from tulip_motion.inverse_kinematics import InverseKinematics, TaskTarget, rotation_z, turn_from_yaw
 from tulip_motion.joint_control import JointGains, feedback
 from tulip_motion.learning_file import LearningFile
@@ -73,10 +72,10 @@ class Tracking:
         p = self._parameters = parameters
         self._model = model
         self._kinematics = InverseKinematics(
-            model, p.clik_gain_position, p.clik_gain_orientation, p.clik_damping, robot.position_limits[:, :12]
+            model, p.clik_gain_position, p.clik_gain_orientation, robot.position_limits[:, :12]
         )
         self._gains = JointGains(p)
-        self._effort_limits = robot.effort_limits[:12]
+        self._effort_limits = (-robot.effort_limits[:12], robot.effort_limits[:12])
         self._omega = 1.0 / time_constant(p.com_height)
         self._lead_share = 1.0 - math.exp(-self._omega * p.control_period)  # of the way to the DCM, in one tick
         self._height = 0.0
@@ -85,7 +84,7 @@ class Tracking:
         self._planned_velocity: Point = (0.0, 0.0)
         self._learner: StepLearner | None = None
         if p.learning != "none":
-            self._learner = StepLearner(p, self._effort_limits)
+            self._learner = StepLearner(p, robot.effort_limits[:12])
             self._learning_file = LearningFile(p, robot, self._learner)
         self.com_acceleration = np.zeros(3)
         """(3,) asked for by the last order, odom axes [m/s^2]."""
@@ -164,22 +163,23 @@ class Tracking:
         if self._torso_may_lean(reference):
             # Accelerations lead the torso. Joints that held it upright as well would hold it against the hip strategy,
             # and against the ground when a sole tilts.
-            torso, torso_rate = estimate.base_rotation, estimate.angular_velocity
+            torso, torso_rate = estimate.base_rotation, estimate.angular_velocity.tolist()
         else:
-            torso, torso_rate = rotation_z(reference.torso_yaw), np.array((0.0, 0.0, reference.torso_yaw_rate))
-        com, com_rate = np.array((x, y, self._height)), np.array((vx, vy, rate))
+            torso, torso_rate = rotation_z(reference.torso_yaw), (0.0, 0.0, reference.torso_yaw_rate)
+        com, com_rate = (x, y, self._height), (vx, vy, rate)
         kinematics.update_jacobian(reference.stance.side)
         kinematics.solve_velocity(TaskTarget(com, com_rate, torso, torso_rate, reference.other))
 
         acceleration = self._task_acceleration(estimate, reference, balance, rate)
-        self.com_acceleration = acceleration[:3].copy()
+        self.com_acceleration = acceleration[:3]  # balance adds to the torso's alone
         self.torques[1] = self._feedforward(acceleration, estimate, reference, balance)
         kinematics.integrate(dt, reference.stance.pose)
         gains = self._gains.of(reference.support, reference.com is not None)
         position, velocity = self.joint_positions, self.joint_velocities
         self.torques[0] = feedback(*gains, position - estimate.joint_positions, velocity - estimate.joint_velocities)
         # Two ufuncs: numpy's clip takes four times as long.
-        effort = np.minimum(np.maximum(self.torques[1] + self.torques[2], -self._effort_limits), self._effort_limits)
+        low, high = self._effort_limits
+        effort = np.minimum(np.maximum(self.torques[1] + self.torques[2], low), high)
         return Order(position, velocity, effort, gains)
 
     def _plan_com(self, reference: Reference) -> None:
@@ -216,7 +216,7 @@ class Tracking:
     ) -> Array:
         """Return (12,) of the CoM, the torso and the other foot: planned, or led by what is measured."""
         p, foot, com = self._parameters, reference.other, reference.com
-        swing = (*foot.acceleration.tolist(), 0.0, 0.0, foot.yaw_acceleration)
+        swing = (*foot.acceleration, 0.0, 0.0, foot.yaw_acceleration)
         if com is not None:
             return np.array((*com.acceleration.tolist(), 0.0, 0.0, 0.0, 0.5 * foot.yaw_acceleration, *swing))
         x, y, z = estimate.com.tolist()
@@ -252,8 +252,7 @@ class Tracking:
             return feedforward(kinematics, inverse_dynamics(kinematics, np.zeros(18), np.zeros(18)), *sharing)
         dynamics = inverse_dynamics(kinematics, kinematics.velocity, kinematics.solve_acceleration(acceleration))
         if self._torso_may_lean(reference):
-            stance, other = reference.stance, reference.other_standing
-            about_x, about_y = turn_for_balance(self._parameters, dynamics.wrench, stance, other)
+            about_x, about_y = turn_for_balance(dynamics.wrench, balance.area)
             if about_x or about_y:
                 acceleration[3:5] += about_x, about_y
                 generalized = kinematics.solve_acceleration(acceleration)
@@ -270,10 +269,8 @@ class Tracking:
             return distance_share(com, *self._kinematics.sole_positions), None
         if balance.right_share in (0.0, 1.0):
             return balance.right_share, None  # one foot takes all of it, wherever it does
-        steps = (reference.stance, reference.other_standing)
-        points = [np.array((*sole_point(step, p.zmp_forward, p.zmp_inward), 0.0)) for step in steps if step is not None]
-        left, right = points if reference.stance.side is Side.LEFT else points[::-1]
-        return balance.right_share, (left, right)
+        left, right = balance.area.aims
+        return balance.right_share, (np.array((*left, 0.0)), np.array((*right, 0.0)))
 
     def _learn(
         self, learner: StepLearner, estimate: Estimate, reference: Reference, step: StepInProgress | None

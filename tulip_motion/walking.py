@@ -19,7 +19,7 @@ from tulip_motion.interface import Side, Support
 from tulip_motion.lipm import DcmPlan, time_constant
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import Reach
-from tulip_motion.stabilizer import nearest_in_support
+from tulip_motion.stabilizer import SupportArea
 from tulip_motion.step_adjustment import StepAdjustment
 from tulip_motion.walking_kick import KickSwing, WalkingKick
 
@@ -155,6 +155,10 @@ class Walking:
         _, landing_dcm = self._plan.evaluate(self._landing_time)
         # The DCM that is wanted at landing, from the aim point.
         self._landing_dcm = (landing_dcm[0] - self._aim[0], landing_dcm[1] - self._aim[1])
+        # The adjustment reckons in the axes of the stance foot.
+        self._axes = (math.cos(stance.pose.yaw), math.sin(stance.pose.yaw))
+        self._landing_dcm_beside = self._beside(landing_dcm, self._aim)
+        self._nominal_beside = self._beside((self._nominal.x, self._nominal.y), (stance.pose.x, stance.pose.y))
         self._adjustment = self._adjustments[stance.side]
 
     def _begin_stop(self, stance: Footstep) -> None:
@@ -217,23 +221,23 @@ class Walking:
         aim, offset = self._aim, self._landing_dcm
         return aim, (aim[0] + decay * offset[0], aim[1] + decay * offset[1])
 
+    def _beside(self, point: tuple[float, float], origin: tuple[float, float]) -> tuple[float, float]:
+        """Return the way from an origin to a point [m] in the axes of the stance foot."""
+        (c, s), x, y = self._axes, point[0] - origin[0], point[1] - origin[1]
+        return c * x + s * y, c * y - s * x
+
     def _adjust(self, dcm: tuple[float, float]) -> None:
         """Move landing place and time to what the measured DCM asks for."""
         assert self._stance is not None and self._swing is not None
         p, pose = self._parameters, self._stance.pose
-        c, s = math.cos(pose.yaw), math.sin(pose.yaw)
-
-        def beside(x: float, y: float) -> tuple[float, float]:
-            return c * x + s * y, c * y - s * x
-
-        foot = self._swing.place
+        remaining = self._planned_landing_time - self._time
         landing = self._adjustment.solve(
-            beside(dcm[0] - self._aim[0], dcm[1] - self._aim[1]),
-            beside(*self._landing_dcm),
-            beside(self._nominal.x - pose.x, self._nominal.y - pose.y),
-            beside(foot[0] - pose.x, foot[1] - pose.y),
-            self._planned_landing_time - self._time,
-            self._planned_landing_time - self._time + p.max_step_extension,
+            self._beside(dcm, self._aim),
+            self._landing_dcm_beside,
+            self._nominal_beside,
+            self._beside(self._swing.place, (pose.x, pose.y)),
+            remaining,
+            remaining + p.max_step_extension,
             # A kick's foot is to be at the ball in time.
             fixed_time=isinstance(self._swing, KickSwing),
         )
@@ -241,7 +245,7 @@ class Walking:
         most = p.max_step_time_rate * p.control_period
         change = self._time + landing.remaining - self._landing_time
         self._landing_time += min(max(change, -most), most)
-        x, y = landing.place
+        (x, y), (c, s) = landing.place, self._axes
         self._target = Pose2D(pose.x + c * x - s * y, pose.y + s * x + c * y, self._nominal.yaw)
 
 
@@ -250,5 +254,5 @@ def must_step(parameters: MotionParameters, feet: tuple[Footstep, Footstep], dcm
     p = parameters
     middle = between_soles(feet, p.zmp_forward, p.zmp_inward)
     stretched = tuple(m + (d - m) / p.ankle_share for d, m in zip(dcm, middle, strict=True))
-    nearest, _ = nearest_in_support(p, (stretched[0], stretched[1]), feet[0], feet[1])
+    nearest, _ = SupportArea.of(p, feet[0], feet[1]).nearest((stretched[0], stretched[1]))
     return math.hypot(stretched[0] - nearest[0], stretched[1] - nearest[1]) > 1e-9

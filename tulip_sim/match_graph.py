@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,9 @@ from tulip_ros.launch import Launcher
 from tulip_ros.plan import Start, make_plan, read_parameters
 from tulip_ros.run import ComponentNode, session
 from tulip_ros.time import stamp_of
+from tulip_sim.perception import PerceptionParameters
 from tulip_sim.scenario import SCENARIOS, make_scenario
-from tulip_sim.trial import TrialObserver, TrialSummary
+from tulip_sim.trial import NO_CAMERA, TrialObserver, TrialSummary
 from tulip_strategy.game_controller import REFEREE_PORT
 
 NODES = ("vision", "worldmodel", "head", "motion", "strategy", "game_input", "user_input")
@@ -86,7 +88,7 @@ def trial_plan(
     parameter_files: Sequence[Path] = (),
     values: Mapping[str, Mapping[str, Any]] | None = None,
     referee_port: int = REFEREE_PORT,
-    perception: bool = False,
+    perception: PerceptionParameters | None = None,
 ) -> tuple[Start, ...]:
     """Return the nodes of a trial: simulator, robot, and recorder if wanted. Arguments as for `play_graph`.
 
@@ -106,10 +108,10 @@ def trial_plan(
         "user_input": {"autostart": True},
     }
     nodes = list(NODES)
-    if perception:
+    if perception is not None:
         nodes[nodes.index("vision")] = "perception"
         given["driver"].update(wait_for=list(nodes), camera=False)
-        given["perception"] = {"seed": seed}
+        given["perception"] = {"seed": seed, **{f"quality.{name}": value for name, value in asdict(perception).items()}}
     if record is not None:
         nodes.append("recorder")
         given["recorder"] = {"path": str(record.absolute()), "exclude": list(UNRECORDED)}
@@ -134,6 +136,7 @@ def play_graph(
     values: Mapping[str, Mapping[str, Any]] | None = None,
     referee_port: int = REFEREE_PORT,
     logs: Path | None = None,
+    perception: PerceptionParameters | None = None,
 ) -> TrialSummary:
     """Play one trial.
 
@@ -147,11 +150,12 @@ def play_graph(
         values: Parameters by node name, which win over the files.
         referee_port: UDP port between referee and game input.
         logs: Folder for one log file a node.
+        perception: How good node perception is, which then stands in for vision; None for camera and vision.
 
     Raises:
         BadInputError: if a node refuses what it was given, or the simulator falls silent.
     """
-    plan = trial_plan(seed, scenario, record, parameter_files, values, referee_port)
+    plan = trial_plan(seed, scenario, record, parameter_files, values, referee_port, perception)
     with (
         Launcher(plan, logs) as launcher,
         session(TrialWatcher, arguments=[], handle_signals=False) as (watcher, spin),
@@ -170,7 +174,7 @@ def play_graph(
         truth = watcher.truth
         assert truth is not None
         return TrialSummary(
-            mode="graph",
+            mode="graph" if perception is None else f"graph, {NO_CAMERA}",
             seed=seed,
             outcome=truth.outcome,
             time=truth.trial_time,

@@ -12,7 +12,7 @@ from tulip_description.field import load_field
 from tulip_sim.lockstep import Lockstep, Settings
 from tulip_sim.lockstep_recording import LockstepRecording
 from tulip_sim.scenario import make_scenario
-from tulip_sim.trial import TrialObserver, TrialSummary
+from tulip_sim.trial import NO_CAMERA, TrialObserver, TrialSummary
 
 Progress = Callable[[float, str], None]
 """Is told simulated time [s] and what the robot is doing."""
@@ -67,7 +67,7 @@ def play_lockstep(
         if trial is not None:
             trial.close()
     return TrialSummary(
-        mode="lockstep",
+        mode="lockstep" if settings is None or settings.perception is None else f"lockstep, {NO_CAMERA}",
         seed=seed,
         outcome=outcome.result.value if outcome else "unfinished",
         time=trial.referee.played,

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_description.field import CrossingKind, Field
-from tulip_description.robot import Robot
+from tulip_description.robot import LEG_JOINTS, Robot
 from tulip_sim.camera import CameraParameters, draw_mount
 from tulip_sim.occlusion import Solids
 from tulip_sim.scene import Body, scene_of
@@ -56,6 +56,8 @@ class PerceptionParameters:
     size_noise: float = 0.02  # standard deviation of the ball's angular radius, share of it
     miss: float = 0.05  # probability that a thing in view is not found
     blank: float = 0.0  # probability that a picture gives nothing at all
+    sharp_speed: float = 1.5  # [rad/s] of the head, up to which pictures are sharp
+    blurred_speed: float = 4.0  # [rad/s] at which nothing is found any more
     false_landmarks: float = 0.1  # crossings and marks a picture that are none, on average
     false_balls: float = 0.001  # balls a picture that are none, on average
     latency: float = 0.048  # [s] from the shutter to the features; never sooner than the camera pose, about 25 ms
@@ -79,6 +81,8 @@ class PerceptionParameters:
         for name in ("miss", "blank"):
             if getattr(self, name) > 1.0:
                 raise ValueError(f"{name} is {getattr(self, name)}; expected a probability")
+        if self.blurred_speed <= self.sharp_speed:
+            raise ValueError(f"blurred_speed is {self.blurred_speed} rad/s; expected more than sharp_speed")
         if self.latency > 2.0:
             raise ValueError(f"latency is {self.latency} s; expected 0 to 2 s")
 
@@ -86,7 +90,14 @@ class PerceptionParameters:
     def ideal(cls) -> PerceptionParameters:
         """Return a perception without noise, misses and false findings; field of view, range and latency stay."""
         return cls(
-            azimuth_noise=0.0, elevation_noise=0.0, size_noise=0.0, miss=0.0, false_landmarks=0.0, false_balls=0.0
+            azimuth_noise=0.0,
+            elevation_noise=0.0,
+            size_noise=0.0,
+            miss=0.0,
+            sharp_speed=1e3,
+            blurred_speed=1e4,
+            false_landmarks=0.0,
+            false_balls=0.0,
         )
 
 
@@ -164,15 +175,25 @@ class Perception:
             truth: The world.
             rng: Where misses come from.
         """
+        return self.noticed(self.in_view(truth), truth, rng)
+
+    def noticed(self, glimpses: tuple[Glimpse, ...], truth: Truth, rng: np.random.Generator) -> tuple[Glimpse, ...]:
+        """Return what vision would find of what is in view: all but misses, of which a fast head makes more."""
         p = self._parameters
         if rng.random() < p.blank:
             return ()
+        speed = float(np.abs(truth.joint_velocities[len(LEG_JOINTS) :]).max())
+        blurred = (speed - p.sharp_speed) / (p.blurred_speed - p.sharp_speed)
+        found = (1.0 - p.miss) * min(1.0, max(0.0, 1.0 - blurred))
+        return tuple(each for each in glimpses if rng.random() < found)
+
+    def in_view(self, truth: Truth) -> tuple[Glimpse, ...]:
+        """Return all that the camera sees at one instant."""
         stand, links = scene_of(truth, self._body, self._keeper_colour)
         uprights = self._posts + (self._poles if stand.poles else [])
         balls = np.array([[*truth.ball_position, self._field.ball_radius]])
         solids = Solids(stand.boxes, np.array(uprights).reshape(-1, 4), balls)
-        scene = _Scene(self._body.camera_in_map(links), solids, truth)
-        return tuple(each for each in self._in_view(scene) if rng.random() >= p.miss)
+        return tuple(self._things(_Scene(self._body.camera_in_map(links), solids, truth)))
 
     def features(
         self, glimpses: tuple[Glimpse, ...], stamp: int, camera_in_footprint: Array, rng: np.random.Generator
@@ -193,7 +214,7 @@ class Perception:
                 found += self._false(kinds, view, rng)
         return Features(stamp, view.position, view.coverage(), tuple(found))
 
-    def _in_view(self, scene: _Scene) -> Iterator[Glimpse]:
+    def _things(self, scene: _Scene) -> Iterator[Glimpse]:
         p, truth = self._parameters, scene.truth
         yield from self._ball(scene)
         for x, y, _, height in self._posts:

@@ -1,7 +1,7 @@
 """Node "perception": features from the simulator's truth, in the place of node "vision". For fast tests of behaviour.
 
 It is part of the simulator, not of the robot: no playing node hears the truth. Start it instead of vision, with
-`trial_plan(..., perception=True)` or by its name, and the driver with `camera: false`.
+`trial_plan(..., perception=PerceptionParameters())` or by its name, and the driver with `camera: false`.
 """
 
 from __future__ import annotations

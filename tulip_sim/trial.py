@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass
 
 from tulip_description.planar import Pose2D, wrap_angle
 
+NO_CAMERA = "made-up features in place of camera and vision"
+"""Told with every figure that perception without pictures had a part in."""
 PORTION = 0.15  # [m] the path is measured in pieces of this length: the trunk's sway at each step is no way
 
 
@@ -15,7 +17,7 @@ class TrialSummary:
     """The end of a trial.
 
     Attributes:
-        mode: "graph" or "lockstep".
+        mode: "graph" or "lockstep", and what else is special.
         seed: Of the scenario and of all noise.
         outcome: As the referee says: goal, own goal, out, time, fallen; or "unfinished".
         time: Played until then [s].

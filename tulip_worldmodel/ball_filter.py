@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_vision.features import Feature, FeatureClass, Features
+from tulip_vision.view import SpreadParameters
 from tulip_worldmodel.mahalanobis import gate
 from tulip_worldmodel.moving_point import MovingPoint, PointEstimate, PointMotion, check_tracking, position_noise
 from tulip_worldmodel.odometry_history import Increment
 from tulip_worldmodel.rejected import Rejected
-from tulip_worldmodel.sighting import Observer, Sighting, in_view
+from tulip_worldmodel.rolling import slowing
+from tulip_worldmodel.sighting import Observer, Sighting, in_view, lasting_spread
 
 Array = NDArray[np.float64]
 
@@ -33,8 +35,9 @@ class BallParameters:
     quiet_velocity_noise: float = 0.1  # [m/s/sqrt(s)] while sightings agree with the filter
     restless_velocity_noise: float = 1.5  # [m/s/sqrt(s)] while they do not: dribbled, pushed
     restless_time: float = 0.2  # [s] over which the agreement is averaged: three pictures
-    extra_azimuth_spread: float = math.radians(0.4)  # [rad] camera pose while walking
-    extra_elevation_spread: float = math.radians(0.6)  # [rad] camera pose while walking
+    pose_azimuth_spread: float = SpreadParameters.pose_azimuth  # [rad] heading of the camera's pose: vision's number
+    pose_elevation_spread: float = SpreadParameters.pose_elevation  # [rad] its tilt: vision's number
+    pose_error_time: float = 0.5  # [s] how long such an error lasts: about a step
     angular_radius_range: float = 3.0  # [m] beyond it the ball's size tells its range better than its elevation
     angular_radius_spread: float = 0.0015  # [rad] a pixel
     start_speed_spread: float = 0.5  # [m/s] of a ball seen for the first time
@@ -126,10 +129,14 @@ class BallFilter:
         p = self._parameters
         rejected: list[Rejected] = []
         sightings: list[Sighting] = []
+        lasting = (
+            lasting_spread(p.pose_azimuth_spread, p.pose_error_time, since_last),
+            lasting_spread(p.pose_elevation_spread, p.pose_error_time, since_last),
+        )
         for feature in features.features:
             if feature.kind is not FeatureClass.BALL:
                 continue
-            sighting = Sighting(feature, observer, self._radius, (p.extra_azimuth_spread, p.extra_elevation_spread))
+            sighting = Sighting(feature, observer, self._radius, lasting)
             if not sighting.has_range or self._range(sighting) > p.longest_range:
                 rejected.append(Rejected(features.stamp, "a ball at or above the horizon, or off the field", feature))
             else:
@@ -248,18 +255,13 @@ class BallFilter:
         return p.quiet_velocity_noise + share * (p.restless_velocity_noise - p.quiet_velocity_noise)
 
     def _rolling(self, point: MovingPoint, moved: Increment, observer_position: Array) -> PointMotion:
-        """Return how a ball rolls: it loses `rolling_deceleration` of its speed each second until it stands.
-
-        The speed that counts is the root mean square over its uncertainty, so that a ball of unknown speed is not
-        taken for a standing one.
-        """
+        """Return how a ball rolls: it loses `rolling_deceleration` of its speed each second until it rests."""
         p = self._parameters
-        x, y, velocity_x, velocity_y = point.state.tolist()
-        covariance = point.covariance
-        speed = math.sqrt(velocity_x**2 + velocity_y**2 + float(covariance[2, 2] + covariance[3, 3]))
+        state = point.state
+        x, y = state[:2].tolist()
         return PointMotion(
             moved.duration,
-            max(0.0, 1.0 - p.rolling_deceleration * moved.duration / max(speed, 1e-6)),
+            slowing(state[2:], point.covariance[2:, 2:], p.rolling_deceleration, moved.duration),
             position_noise(
                 (x - float(observer_position[0]), y - float(observer_position[1])),
                 p.position_noise_per_second**2 * moved.duration + p.position_noise_per_metre**2 * moved.distance,

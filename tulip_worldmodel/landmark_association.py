@@ -70,10 +70,13 @@ class Association:
     Attributes:
         choices: One an observation, in their order.
         log_likelihood: Of all observations, with the best choices.
+        nearest: For each observation, the squared Mahalanobis distance of the nearest candidate and its dimension;
+            infinite where none is possible.
     """
 
     choices: tuple[Choice, ...]
     log_likelihood: float
+    nearest: tuple[tuple[float, int], ...]
 
 
 @dataclass(frozen=True)
@@ -132,23 +135,30 @@ def associate(
     rejected: dict[int, str] = {}
     outside = 0.0  # cost of the features without any candidate
     usable: list[_Linearized] = []
+    nearest = [(math.inf, 2)] * len(observations)
     for index, observation in enumerate(observations):
         possible = observation.possible(state)
-        near = _inside_gate(state, covariance, observation, possible, gate_probability) if len(possible) else None
-        if near is None:
+        near = np.empty(0, dtype=np.intp)
+        if len(possible):
+            innovations, jacobians, noises = observation.linearize(state, possible)
+            spreads = jacobians @ covariance @ jacobians.transpose(0, 2, 1) + noises
+            distances, _ = distances_and_determinants(innovations, spreads)
+            dimension = innovations.shape[1]
+            nearest[index] = float(distances.min()), dimension
+            near = np.flatnonzero(distances <= gate(gate_probability, dimension))
+        if not len(near):
             rejected[index] = "no landmark inside the gate"
             outside += -2.0 * math.log(false_rates[index] * clutter[index])
             continue
-        candidates, innovations, jacobians, noises = near
-        dimension = innovations.shape[1]
+        candidates = possible[near].tolist()
         usable.append(
             _Linearized(
                 index,
                 tuple(candidates),
                 tuple(observation.key(candidate) for candidate in candidates),
-                innovations,
-                jacobians,
-                noises,
+                innovations[near],
+                jacobians[near],
+                noises[near],
                 gate(gate_probability, dimension),
                 dimension * math.log(2.0 * math.pi) - 2.0 * math.log(1.0 - false_rates[index]),
                 -2.0 * math.log(false_rates[index] * clutter[index]),
@@ -163,19 +173,7 @@ def associate(
         limit = children[0].cost + 2.0 * gap  # later features may turn the order, not by more than this in practice
         hypotheses = [_grown(child, item) for child in children[:WIDTH] if child.cost <= limit]
     choices = _verdicts(len(observations), usable, hypotheses, rejected, gap)
-    return Association(choices, -0.5 * (hypotheses[0].cost + outside))
-
-
-def _inside_gate(
-    state: Array, covariance: Array, observation: Observation, possible: Indices, probability: float
-) -> tuple[list[int], Array, Array, Array] | None:
-    innovations, jacobians, noises = observation.linearize(state, possible)
-    spreads = jacobians @ covariance @ jacobians.transpose(0, 2, 1) + noises
-    distances, _ = distances_and_determinants(innovations, spreads)
-    near = np.flatnonzero(distances <= gate(probability, innovations.shape[1]))
-    if not len(near):
-        return None
-    return possible[near].tolist(), innovations[near], jacobians[near], noises[near]
+    return Association(choices, -0.5 * (hypotheses[0].cost + outside), tuple(nearest))
 
 
 def _children(parent: _Hypothesis, item: _Linearized) -> list[_Child]:

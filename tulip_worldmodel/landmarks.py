@@ -1,8 +1,8 @@
 """What the robot should see of the field from a pose, and how that changes with the pose.
 
-State of localization, (6,): x, y [m], yaw [rad] of base_footprint in map; the small rotations about the x and
-y axes of base_footprint [rad] by which the camera is tilted beyond what kinematics and IMU say; and the heading
-drift [rad/s] that dead reckoning misses. An observed ray is the true offset o turned by the tilt w: o' = o + w x o.
+State of localization, (7,): x, y [m], yaw [rad] of base_footprint in map; the small rotation w about the x, y and
+z axes of base_footprint [rad] by which the camera's pose errs from what kinematics and IMU say; and the heading
+drift [rad/s] that dead reckoning misses. An observed ray is the true offset o turned by w: o' = o + w x o.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from tulip_worldmodel.direction import directions, meet_plane, rays, wrap
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+STATES = 7
+ERROR = slice(3, 6)  # of the state: the camera pose's error w
 CROSSINGS = {
     FeatureClass.CROSSING_L: CrossingKind.L,
     FeatureClass.CROSSING_T: CrossingKind.T,
@@ -100,31 +102,28 @@ def point_directions(state: Array, points: Array, camera_position: Array) -> tup
     """Return under which angles places on the ground appear.
 
     Args:
-        state: (6,) see the module.
+        state: (7,) see the module.
         points: (n, 2) in map [m].
         camera_position: (3,) optical centre in base_footprint [m].
 
     Returns:
-        (n, 2) azimuth and elevation [rad], and (n, 2, 6) their derivatives by the state.
+        (n, 2) azimuth and elevation [rad], and (n, 2, 7) their derivatives by the state.
     """
-    yaw, roll, pitch = state[2], state[3], state[4]
+    yaw = state[2]
     c, s = math.cos(yaw), math.sin(yaw)
     to_footprint = np.array([[c, s], [-s, c]])
     relative = (points - state[:2]) @ to_footprint.T
     offset = np.empty((len(points), 3))
     offset[:, :2] = relative - camera_position[:2]
     offset[:, 2] = -camera_position[2]
-    by_state = np.zeros((len(points), 3, 6))
+    by_state = np.zeros((len(points), 3, STATES))
     by_state[:, :2, :2] = -to_footprint
     by_state[:, 0, 2] = relative[:, 1]
     by_state[:, 1, 2] = -relative[:, 0]
-    tilt = np.array([[1.0, 0.0, pitch], [0.0, 1.0, -roll], [-pitch, roll, 1.0]])
-    by_state = tilt @ by_state
-    by_state[:, 1, 3] = -offset[:, 2]
-    by_state[:, 2, 3] = offset[:, 1]
-    by_state[:, 0, 4] = offset[:, 2]
-    by_state[:, 2, 4] = -offset[:, 0]
-    angles, by_offset = directions(offset @ tilt.T)
+    turn = _turned(state[ERROR])
+    by_state = turn @ by_state
+    by_state[:, :, ERROR] = _by_turn(offset)
+    angles, by_offset = directions(offset @ turn.T)
     return angles, by_offset @ by_state
 
 
@@ -135,7 +134,7 @@ class LineMisfits:
     Attributes:
         misfits: (n, 2) angle between the two [rad, in [-pi/2, pi/2)] and distance of the piece's middle from the
             line [m].
-        by_state: (n, 2, 6) derivatives of the misfits by the state.
+        by_state: (n, 2, 7) derivatives of the misfits by the state.
         by_angles: (n, 2, 4) by azimuth and elevation of the first and the second end.
         along: (n, 2) where both ends lie along the line, from its start [m].
     """
@@ -158,28 +157,24 @@ class LinePiece:
         """
         self._camera_position = camera_position
         self._rays, self._rays_by_angles = rays(ends)
-        self._rays_by_tilt = np.zeros((2, 3, 2))
-        self._rays_by_tilt[:, 1, 0] = self._rays[:, 2]
-        self._rays_by_tilt[:, 2, 0] = -self._rays[:, 1]
-        self._rays_by_tilt[:, 0, 1] = -self._rays[:, 2]
-        self._rays_by_tilt[:, 2, 1] = self._rays[:, 0]
+        self._rays_by_error = -_by_turn(self._rays)
 
     def ground_ends(self) -> Array:
-        """Return (2, 2) both ends on the ground in base_footprint [m], without tilt."""
+        """Return (2, 2) both ends on the ground in base_footprint [m], as the camera's pose has it."""
         return meet_plane(self._rays, self._camera_position)[0]
 
     def along(self, state: Array, lines: Lines) -> Array:
         """Return where both ends lie along lines, (n, 2) from their starts [m]."""
-        points = meet_plane(self._rays @ _untilt(state).T, self._camera_position)[0]
+        points = meet_plane(self._rays @ _turned(-state[ERROR]).T, self._camera_position)[0]
         in_map = points @ _rotation(state[2]).T + state[:2]
         return np.asarray(lines.along @ in_map.T - lines.starts[:, :1])
 
     def misfits(self, state: Array, lines: Lines) -> LineMisfits:
-        """Return how the piece lies relative to lines, seen from a state (6,)."""
-        untilt = _untilt(state)
-        points, points_by_rays = meet_plane(self._rays @ untilt.T, self._camera_position)
-        points_by_tilt = points_by_rays @ self._rays_by_tilt
-        points_by_angles = points_by_rays @ (untilt @ self._rays_by_angles)
+        """Return how the piece lies relative to lines, seen from a state (7,)."""
+        back = _turned(-state[ERROR])
+        points, points_by_rays = meet_plane(self._rays @ back.T, self._camera_position)
+        points_by_error = points_by_rays @ self._rays_by_error
+        points_by_angles = points_by_rays @ (back @ self._rays_by_angles)
         rotation = _rotation(state[2])
         in_map = points @ rotation.T + state[:2]
         piece = points[1] - points[0]
@@ -191,12 +186,12 @@ class LinePiece:
         misfits[:, 0] = half_turn(math.atan2(piece[1], piece[0]) + state[2] - lines.directions)
         misfits[:, 1] = lines.across @ (0.5 * (in_map[0] + in_map[1])) - lines.starts[:, 1]
         turn = np.array([-piece[1], piece[0]]) / max(float(piece @ piece), 1e-6)  # angle by the second end
-        by_state = np.zeros((count, 2, 6))
+        by_state = np.zeros((count, 2, STATES))
         by_state[:, 0, 2] = 1.0
-        by_state[:, 0, 3:5] = turn @ (points_by_tilt[1] - points_by_tilt[0])
+        by_state[:, 0, ERROR] = turn @ (points_by_error[1] - points_by_error[0])
         by_state[:, 1, :2] = lines.across
         by_state[:, 1, 2] = across @ np.array([-middle[1], middle[0]])
-        by_state[:, 1, 3:5] = across @ (0.5 * (points_by_tilt[0] + points_by_tilt[1]))
+        by_state[:, 1, ERROR] = across @ (0.5 * (points_by_error[0] + points_by_error[1]))
         by_angles = np.empty((count, 2, 4))
         by_angles[:, 0, :2] = -turn @ points_by_angles[0]
         by_angles[:, 0, 2:] = turn @ points_by_angles[1]
@@ -205,10 +200,20 @@ class LinePiece:
         return LineMisfits(misfits, by_state, by_angles, lines.along @ in_map.T - lines.starts[:, :1])
 
 
-def _untilt(state: Array) -> Array:
-    """Return (3, 3) that turns an observed ray back by the camera's tilt."""
-    roll, pitch = state[3], state[4]
-    return np.array([[1.0, 0.0, -pitch], [0.0, 1.0, roll], [pitch, -roll, 1.0]])
+def _turned(rotation: Array) -> Array:
+    """Return (3, 3) that turns by a small rotation vector (3,): v + w x v."""
+    roll, pitch, turn = rotation.tolist()
+    return np.array([[1.0, -turn, pitch], [turn, 1.0, -roll], [-pitch, roll, 1.0]])
+
+
+def _by_turn(vectors: Array) -> Array:
+    """Return (n, 3, 3) the derivative of w x v by w, for (n, 3) vectors v."""
+    jacobian = np.zeros((len(vectors), 3, 3))
+    x, y, z = vectors.T
+    jacobian[:, 0, 1], jacobian[:, 0, 2] = z, -y
+    jacobian[:, 1, 0], jacobian[:, 1, 2] = -z, x
+    jacobian[:, 2, 0], jacobian[:, 2, 1] = y, -x
+    return jacobian
 
 
 def _rotation(yaw: float) -> Array:
@@ -225,24 +230,24 @@ def half_turn(angles: Array) -> Array:
 class PointObservation:
     """A feature that shows one of several places on the ground."""
 
-    def __init__(self, feature: Feature, points: Array, camera_position: Array, spreads: tuple[float, float, float]):
+    def __init__(self, feature: Feature, points: Array, camera_position: Array, landmark_spread: float):
         """Remember what was seen.
 
         Args:
-            feature: A post, pole, crossing or mark.
+            feature: A post, pole, crossing or mark; its spreads are those that it shares with no other feature.
             points: (n, 2) places in map that it may be [m].
             camera_position: (3,) optical centre in base_footprint [m].
-            spreads: Added to the feature's own: azimuth [rad], elevation [rad], place of the landmark [m].
+            landmark_spread: Standard deviation of the landmark's place along each axis [m].
         """
         self.feature = feature
         self._count = len(points)
         self._points = points
         self._camera_position = camera_position
-        azimuth_spread, elevation_spread, self._landmark_spread = spreads
-        self._azimuth_variance = feature.azimuth_spread**2 + azimuth_spread**2
-        self._elevation_variance = feature.elevation_spread**2 + elevation_spread**2
-        self._rows = 1 if math.isnan(feature.elevation) else 2
-        self._seen = np.array([feature.azimuth, feature.elevation])[: self._rows]
+        self._landmark_spread = landmark_spread
+        self._azimuth_variance = feature.azimuth_spread**2
+        self._elevation_variance = feature.elevation_spread**2
+        self.rows = 1 if math.isnan(feature.elevation) else 2
+        self._seen = np.array([feature.azimuth, feature.elevation])[: self.rows]
 
     def key(self, candidate: int) -> object:
         """Return what a candidate is, so that no two features of a picture claim it."""
@@ -253,17 +258,17 @@ class PointObservation:
         return np.arange(self._count)
 
     def linearize(self, state: Array, candidates: Indices) -> tuple[Array, Array, Array]:
-        """Return innovations (k, m), their Jacobians (k, m, 6) and noise (k, m, m) of some candidates."""
+        """Return innovations (k, m), their Jacobians (k, m, 7) and noise (k, m, m) of some candidates."""
         angles, jacobian = point_directions(state, self._points[candidates], self._camera_position)
-        innovation = self._seen - angles[:, : self._rows]
+        innovation = self._seen - angles[:, : self.rows]
         innovation[:, 0] = wrap(innovation[:, 0])
         height, spread = self._camera_position[2], self._landmark_spread
         ground = height / np.tan(np.minimum(np.maximum(-angles[:, 1], 0.02), 1.5))
-        noise = np.zeros((len(candidates), self._rows, self._rows))
+        noise = np.zeros((len(candidates), self.rows, self.rows))
         noise[:, 0, 0] = self._azimuth_variance + (spread / np.maximum(ground, 0.1)) ** 2
-        if self._rows == 2:
+        if self.rows == 2:
             noise[:, 1, 1] = self._elevation_variance + (spread * height / (ground**2 + height**2)) ** 2
-        return innovation, jacobian[:, : self._rows], noise
+        return innovation, jacobian[:, : self.rows], noise
 
 
 class LineObservation:
@@ -276,17 +281,15 @@ class LineObservation:
         feature: Feature,
         lines: Lines,
         camera_position: Array,
-        spreads: tuple[float, float, float],
+        landmark_spread: float,
     ):
         """Remember what was seen; arguments as of `PointObservation`."""
         self.feature = feature
         self._lines = lines
         ends = np.array([[feature.azimuth, feature.elevation], [feature.end_azimuth, feature.end_elevation]])
         self._piece = LinePiece(ends, camera_position)
-        azimuth_spread, elevation_spread, self._line_spread = spreads
-        azimuth_variance = feature.azimuth_spread**2 + azimuth_spread**2
-        elevation_variance = feature.elevation_spread**2 + elevation_spread**2
-        self._angles_noise = np.array([azimuth_variance, elevation_variance, azimuth_variance, elevation_variance])
+        self._line_spread = landmark_spread
+        self._angles_noise = np.square([feature.azimuth_spread, feature.elevation_spread] * 2)
 
     def key(self, candidate: int) -> object:
         """Return None: several pieces of one line may be in a picture."""
@@ -303,7 +306,7 @@ class LineObservation:
         return self._piece.ground_ends()
 
     def linearize(self, state: Array, candidates: Indices) -> tuple[Array, Array, Array]:
-        """Return innovations (k, 2), their Jacobians (k, 2, 6) and noise (k, 2, 2) of some candidates."""
+        """Return innovations (k, 2), their Jacobians (k, 2, 7) and noise (k, 2, 2) of some candidates."""
         found = self._piece.misfits(state, self._lines[candidates])
         noise = (found.by_angles * self._angles_noise) @ found.by_angles.transpose(0, 2, 1)
         length = np.maximum(np.abs(found.along[:, 1] - found.along[:, 0]), 0.1)

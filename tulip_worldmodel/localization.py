@@ -26,15 +26,17 @@ from tulip_worldmodel.direction import HORIZON
 from tulip_worldmodel.landmark_association import Observation
 from tulip_worldmodel.landmarks import CROSSINGS, LineObservation, PointObservation, landmarks_of
 from tulip_worldmodel.localization_parameters import LocalizationParameters
+from tulip_worldmodel.noise_scale import NoiseScale
 from tulip_worldmodel.odometry_history import Increment
 from tulip_worldmodel.pose_filter import Outcome, PoseFilter
 from tulip_worldmodel.pose_seeds import HEADING_SPREAD, POSITION_SPREAD, SeedFinder, close
 from tulip_worldmodel.rejected import Rejected
+from tulip_worldmodel.side import SideJudge, is_pole
 
 Array = NDArray[np.float64]
 
 LEAST_WEIGHT = 1e-4  # a hypothesis below it is dropped
-LEAST_SPREAD = math.radians(0.02)  # [rad] of a feature's own direction: a sixth of a pixel
+LEAST_SPREAD = math.radians(0.03)  # [rad] of a feature's own direction: a third of a pixel
 TRUST_TIME = 10.0  # [s] in which the heading kept for the case of being lost follows the filter's
 
 
@@ -42,6 +44,12 @@ TRUST_TIME = 10.0  # [s] in which the heading kept for the case of being lost fo
 class _Hypothesis:
     filter: PoseFilter
     log_weight: float
+
+    def absorb(self, other: _Hypothesis) -> None:
+        """Become one with another that is close."""
+        weight = float(np.logaddexp(self.log_weight, other.log_weight))
+        self.filter.absorb(other.filter, math.exp(other.log_weight - weight))
+        self.log_weight = weight
 
 
 class Localization:
@@ -59,6 +67,8 @@ class Localization:
         p = self._parameters = parameters
         self._landmarks = landmarks_of(field)
         self._seeds = SeedFinder(parameters, field)
+        self._side = SideJudge(parameters, self._landmarks, self._seeds)
+        self._scale = NoiseScale(p)
         spreads = (p.start_position_spread, p.start_position_spread, p.start_heading_spread)
         self._hypotheses = [_Hypothesis(PoseFilter(parameters, start, spreads), 0.0)]
         self._heading = start.yaw  # [rad] by dead reckoning, drawn slowly to what was believed while all was well
@@ -74,9 +84,14 @@ class Localization:
         return self._mixed([(each.filter.pose, each.filter.covariance) for each in self._hypotheses])
 
     @property
-    def tilt(self) -> Array:
-        """(2,) estimated roll and pitch of the camera beyond what its pose says [rad]."""
-        return self._best.tilt
+    def camera_error(self) -> Array:
+        """(3,) estimated rotation about x, y, z of base_footprint by which the camera's pose errs [rad]."""
+        return self._best.camera_error
+
+    @property
+    def noise_scale(self) -> float:
+        """How many times worse vision is taken to be than it says, >= 1."""
+        return self._scale.value
 
     @property
     def lost(self) -> bool:
@@ -91,7 +106,7 @@ class Localization:
     def predict(self, moved: Increment) -> None:
         """Move with dead reckoning."""
         for each in self._hypotheses:
-            each.filter.predict(moved)
+            each.filter.predict(moved, self._scale.value)
         self._heading = wrap_angle(self._heading + moved.pose.yaw)
         if not self.lost and self._best.detector.evidence == 0.0 and self._best.pictures > 0:
             share = 1.0 - math.exp(-moved.duration / TRUST_TIME)
@@ -126,10 +141,14 @@ class Localization:
                 shown.append(feature)
         if self.lost and observations:
             self._sow(features)
+        poles = [each for each in observations if isinstance(each, PointObservation) and is_pole(each.feature.kind)]
         outcomes: dict[int, Outcome] = {}
         for each in self._hypotheses:
+            self._side.judge(each.filter, poles, features)
             outcome = outcomes[id(each)] = each.filter.update(observations, since_last)
             each.log_weight += self._parameters.evidence_share * outcome.log_likelihood
+        for observation, nearest in zip(observations, outcomes[id(self._hypotheses[0])].nearest, strict=True):
+            self._scale.add(*nearest, self._best.false_rate(observation.feature))
         self._select()
         best = outcomes[id(self._hypotheses[0])]
         return (*rejected, *(Rejected(features.stamp, reason, shown[index]) for index, reason in best.rejected))
@@ -141,7 +160,7 @@ class Localization:
     def _sow(self, features: Features) -> None:
         """Add the poses that explain a picture, unless they are there already."""
         p = self._parameters
-        known = [each.filter.pose for each in self._hypotheses if not each.filter.detector.lost]
+        known = [each for each in self._hypotheses if not each.filter.detector.lost]
         seeds = self._seeds.find(features, self._heading)
         if not seeds:
             return
@@ -150,20 +169,26 @@ class Localization:
         for each in self._hypotheses:
             each.log_weight += math.log(1.0 - p.seed_share)
         for seed in seeds:
-            if not any(close(seed.pose, pose) for pose in known):
-                log_weight = math.log(p.seed_share) + seed.log_weight - norm
-                self._hypotheses.append(_Hypothesis(PoseFilter(p, seed.pose, spreads), log_weight))
+            log_weight = math.log(p.seed_share) + seed.log_weight - norm
+            sown = _Hypothesis(PoseFilter(p, seed.pose, spreads), log_weight)
+            twin = next((each for each in known if close(seed.pose, each.filter.pose)), None)
+            if twin is None:
+                self._hypotheses.append(sown)
+            else:
+                twin.absorb(sown)
 
     def _select(self) -> None:
         """Drop, merge and sort the hypotheses, and see whether one has won."""
         p = self._parameters
+        for each in self._hypotheses:
+            self._side.settle(each.filter, self._heading)
         alive = [each for each in self._hypotheses if not each.filter.detector.lost] or self._hypotheses
         alive.sort(key=lambda each: -each.log_weight)
         kept: list[_Hypothesis] = []
         for each in alive:
             twin = next((other for other in kept if close(each.filter.pose, other.filter.pose)), None)
             if twin is not None:
-                twin.log_weight = float(np.logaddexp(twin.log_weight, each.log_weight))
+                twin.absorb(each)
             elif len(kept) < p.most_hypotheses and each.log_weight - alive[0].log_weight > math.log(LEAST_WEIGHT):
                 kept.append(each)
         norm = float(np.logaddexp.reduce([each.log_weight for each in kept]))
@@ -186,24 +211,14 @@ class Localization:
             total += math.exp(each.log_weight) * (covariance + np.outer(off, off))
         return total
 
-    def _own_spread(self, feature: Feature) -> Feature:
-        """Return a feature with the spread that it does not share with all others of its picture."""
-        p = self._parameters
-        azimuth = math.sqrt(max(feature.azimuth_spread**2 - p.pose_azimuth_spread**2, LEAST_SPREAD**2))
-        elevation = feature.elevation_spread
-        if not math.isnan(elevation):
-            elevation = math.sqrt(max(elevation**2 - p.pose_elevation_spread**2, LEAST_SPREAD**2))
-        return replace(feature, azimuth_spread=azimuth, elevation_spread=elevation)
-
     def _observation(self, feature: Feature, camera_position: Array) -> tuple[Observation | None, str]:
         p = self._parameters
-        spreads = (p.extra_azimuth_spread, p.extra_elevation_spread, p.landmark_spread)
-        feature = self._own_spread(feature)
+        feature = own_spread(feature, p, self._scale.value)
         lowest = -math.atan2(float(camera_position[2]), p.longest_range)
         if feature.kind is FeatureClass.LINE:
             if not (feature.elevation < HORIZON and feature.end_elevation < HORIZON):
                 return None, "an end of the line is not below the horizon"
-            line = LineObservation(feature, self._landmarks.lines, camera_position, spreads)
+            line = LineObservation(feature, self._landmarks.lines, camera_position, p.landmark_spread)
             ends = line.ground_ends()
             if np.linalg.norm(ends.mean(axis=0)) > p.longest_range:
                 return None, "too far away"
@@ -214,4 +229,25 @@ class Localization:
             return None, "too far away"
         if math.isnan(feature.elevation) and feature.kind in CROSSINGS:
             return None, "a crossing without elevation"
-        return PointObservation(feature, self._landmarks.points[feature.kind], camera_position, spreads), ""
+        return PointObservation(feature, self._landmarks.points[feature.kind], camera_position, p.landmark_spread), ""
+
+
+def own_spread(feature: Feature, parameters: LocalizationParameters, scale: float) -> Feature:
+    """Return a feature with the spread that it does not share with all others of its picture.
+
+    The camera pose's share, as vision puts it in (`View.spreads`), is in the state. A roll about the line of sight
+    moves the azimuth of what lies below the horizon.
+
+    Args:
+        feature: As vision gives it.
+        parameters: Of which the spreads of the camera's pose count.
+        scale: How many times worse vision is than it says (noise_scale.py).
+    """
+    p = parameters
+    azimuth = feature.azimuth_spread**2 - p.pose_azimuth_spread**2
+    elevation = feature.elevation_spread**2
+    if not math.isnan(feature.elevation):
+        azimuth -= (p.pose_elevation_spread * math.tan(feature.elevation)) ** 2
+        elevation = max(elevation - p.pose_elevation_spread**2, LEAST_SPREAD**2)
+    azimuth = max(azimuth, LEAST_SPREAD**2)
+    return replace(feature, azimuth_spread=scale * math.sqrt(azimuth), elevation_spread=scale * math.sqrt(elevation))

@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
+from tulip_vision.view import SpreadParameters
+
 
 @dataclass(frozen=True)
 class LocalizationParameters:
     """Parameters of localization. Noise of dead reckoning grows with the root of what it is given for.
 
-    What odometry says of its own uncertainty (slips, hops, falls) is added to the position noise given here.
+    What odometry says of its own uncertainty (slips, hops, falls) is added to the position noise given here. How far
+    the camera's pose may be off is stated once, in vision's `SpreadParameters`: vision puts it into the spreads of its
+    features, as each of them errs by it, and localization takes it out again, as all features of a picture share it.
     """
 
     start_position_spread: float = 0.3  # [m] a person puts the robot down by eye
@@ -23,14 +27,11 @@ class LocalizationParameters:
     heading_noise_per_second: float = math.radians(0.04)  # [rad/sqrt(s)] noise of the IMU's heading
     drift_spread: float = 0.0005  # [rad/s] of the heading: bias of the IMU, twice that of a good one
     drift_time: float = 60.0  # [s] how long a drift lasts
-    tilt_spread: float = math.radians(0.3)  # [rad] of the camera: IMU, bending of legs and neck while walking
-    tilt_time: float = 0.5  # [s] how long a tilt lasts: about a step
-    pose_azimuth_spread: float = math.radians(0.3)  # [rad] that vision puts into its spreads for the camera's pose
-    pose_elevation_spread: float = math.radians(0.5)  # [rad] likewise; the state holds it, all features share it
-    extra_azimuth_spread: float = math.radians(
-        0.1
-    )  # [rad] lens, and time stamps while turning; 0.4 deg on a body with play
-    extra_elevation_spread: float = math.radians(0.1)  # [rad] likewise; 0.3 deg
+    pose_azimuth_spread: float = SpreadParameters.pose_azimuth  # [rad] heading of the camera's pose: vision's number
+    pose_elevation_spread: float = SpreadParameters.pose_elevation  # [rad] its roll and pitch: vision's number
+    pose_error_time: float = 0.5  # [s] how long such an error lasts: about a step
+    noise_scale_rate: float = 0.01  # by which a feature changes the factor on vision's spreads: 4 s to the threefold
+    greatest_noise_scale: float = 4.0  # vision is not taken to be worse than so many times what it says
     landmark_spread: float = 0.01  # [m] which edge of a line or post is seen; 0.03 on a field painted by hand
     longest_range: float = 8.0  # [m] features further away on the ground are not used
     shortest_line: float = 0.5  # [m] shorter pieces may belong to the centre circle
@@ -46,6 +47,7 @@ class LocalizationParameters:
     lost_evidence: float = (
         8.0  # nats of Page's test that say "lost": about one false alarm in 3000 independent pictures
     )
+    usual_evidence: float = 0.35  # nats a picture takes off: unexplained are 0.15 where right, 0.5 where wrong
     most_evidence: float = 1.0  # nats that one picture can add: what it shows wrongly, the next one shows, too
     seed_share: float = 0.1  # of all weight, that goes to new hypotheses at each picture while lost
     seeds: int = 8  # new hypotheses a picture at most
@@ -79,5 +81,7 @@ class LocalizationParameters:
                 raise ValueError(f"{name} is {getattr(self, name)}; expected a probability < 1")
         if self.chance_rate >= self.explained_rate:
             raise ValueError(f"chance_rate is {self.chance_rate}; expected less than explained_rate")
+        if self.greatest_noise_scale < 1.0:
+            raise ValueError(f"greatest_noise_scale is {self.greatest_noise_scale}; expected >= 1")
         if self.association_odds <= 1.0:
             raise ValueError(f"association_odds is {self.association_odds}; expected > 1")

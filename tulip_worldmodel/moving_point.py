@@ -14,6 +14,7 @@ from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
 from tulip_worldmodel.mahalanobis import distances_and_determinants
+from tulip_worldmodel.rolling import Slowing
 from tulip_worldmodel.sighting import Sighting
 
 Array = NDArray[np.float64]
@@ -56,13 +57,13 @@ class PointMotion:
 
     Attributes:
         duration: [s].
-        keep: Share of the velocity that is left afterwards, 0 to 1; its mean acts on the position.
+        slowing: What becomes of the velocity; the mean of before and after acts on the position.
         position_noise: (2, 2) covariance added to the position [m^2].
         velocity_variance: Variance added to each component of the velocity [m^2/s^2].
     """
 
     duration: float
-    keep: float
+    slowing: Slowing
     position_noise: Array
     velocity_variance: float
 
@@ -92,15 +93,14 @@ class MovingPoint:
 
     def predict(self, motion: PointMotion) -> None:
         """Move on."""
-        self._filter.F, self._filter.Q = _transition_and_noise(motion)
-        self._filter.predict()
-        self._tidy()
+        estimate = self.predicted(motion)
+        self._filter.x, self._filter.P = estimate.state, estimate.covariance
 
     def predicted(self, motion: PointMotion) -> PointEstimate:
         """Return what `predict` leads to, without changing the filter."""
-        transition, noise = _transition_and_noise(motion)
+        transition, offset, noise = _transition(motion)
         covariance = transition @ self._filter.P @ transition.T + noise
-        return PointEstimate(transition @ self._filter.x, (covariance + covariance.T) / 2.0)
+        return PointEstimate(transition @ self._filter.x + offset, (covariance + covariance.T) / 2.0)
 
     def distance(self, sighting: Sighting) -> float:
         """Return the squared Mahalanobis distance of a sighting."""
@@ -124,20 +124,19 @@ class MovingPoint:
         self._filter.P = (self._filter.P + self._filter.P.T) / 2.0
 
 
-def _transition_and_noise(motion: PointMotion) -> tuple[Array, Array]:
-    """Return the (4, 4) transition of the state and the (4, 4) covariance added."""
-    duration, keep, variance = motion.duration, motion.keep, motion.velocity_variance
-    drift = duration * (1.0 + keep) / 2.0
-    transition = np.array(
-        [[1.0, 0.0, drift, 0.0], [0.0, 1.0, 0.0, drift], [0.0, 0.0, keep, 0.0], [0.0, 0.0, 0.0, keep]]
-    )
+def _transition(motion: PointMotion) -> tuple[Array, Array, Array]:
+    """Return the (4, 4) transition of the state, what is added to it (4,), and the (4, 4) covariance added."""
+    duration, slowing, variance = motion.duration, motion.slowing, motion.velocity_variance
+    transition = np.eye(4)
+    transition[:2, 2:] = 0.5 * duration * (np.eye(2) + slowing.keep)
+    transition[2:, 2:] = slowing.keep
+    offset = np.concatenate((0.5 * duration * slowing.drop, slowing.drop))
     # Velocity as a random walk: its integral moves the position too.
     position, both = variance * duration**2 / 3.0, variance * duration / 2.0
-    noise = np.array(
-        [[position, 0.0, both, 0.0], [0.0, position, 0.0, both], [both, 0.0, variance, 0.0], [0.0, both, 0.0, variance]]
-    )
+    noise = np.kron(np.array([[position, both], [both, variance]]), np.eye(2))
+    noise += np.kron(np.array([[0.25 * duration**2, 0.5 * duration], [0.5 * duration, 1.0]]), slowing.noise)
     noise[:2, :2] += motion.position_noise
-    return transition, noise
+    return transition, offset, noise
 
 
 def position_noise(offset: tuple[float, float], everywhere: float, across: float) -> Array:

@@ -15,6 +15,7 @@ from tulip_worldmodel.mahalanobis import gate
 from tulip_worldmodel.moving_point import MovingPoint, PointEstimate, PointMotion, check_tracking, position_noise
 from tulip_worldmodel.odometry_history import Increment
 from tulip_worldmodel.rejected import Rejected
+from tulip_worldmodel.rolling import Slowing
 from tulip_worldmodel.sighting import Observer, Sighting, in_view
 
 Array = NDArray[np.float64]
@@ -31,8 +32,8 @@ class OpponentParameters:
     position_noise_per_second: float = 0.05  # [m/sqrt(s)] the point below a robot is not well defined
     position_noise_per_metre: float = 0.10  # [m/sqrt(m)] dead reckoning of the walking robot
     position_noise_per_radian: float = 0.06  # [rad/sqrt(rad)] times range: dead reckoning of the turning robot
-    extra_azimuth_spread: float = math.radians(1.0)  # [rad] a body is wide
-    extra_elevation_spread: float = math.radians(1.0)  # [rad] feet differ from the middle of the body
+    body_azimuth_spread: float = math.radians(1.0)  # [rad] a body is wide, besides what vision claims
+    body_elevation_spread: float = math.radians(1.0)  # [rad] feet differ from the middle of the body, likewise
     start_speed_spread: float = 0.3  # [m/s]
     longest_range: float = 8.0  # [m] not born further away
     body_radius: float = 0.3  # [m] two nearer than this are one; what lies behind is hidden
@@ -80,7 +81,7 @@ class Opponent:
         x, y = self.point.state[:2].tolist()
         return PointMotion(
             moved.duration,
-            math.exp(-moved.duration / p.velocity_time),
+            Slowing(math.exp(-moved.duration / p.velocity_time) * np.eye(2), np.zeros(2), np.zeros((2, 2))),
             position_noise(
                 (x - float(observer_position[0]), y - float(observer_position[1])),
                 p.position_noise_per_second**2 * moved.duration + p.position_noise_per_metre**2 * moved.distance,
@@ -125,7 +126,7 @@ class OpponentFilter:
         """
         p = self._parameters
         sightings = [
-            Sighting(feature, observer, GROUND, (p.extra_azimuth_spread, p.extra_elevation_spread))
+            Sighting(feature, observer, GROUND, (p.body_azimuth_spread, p.body_elevation_spread))
             for feature in features.features
             if feature.kind is FeatureClass.OPPONENT
         ]

@@ -1,9 +1,9 @@
 """One hypothesis of where the robot is: an extended Kalman filter over dead reckoning and landmarks.
 
-State: x, y [m], yaw [rad] of base_footprint in map, two small tilts of the camera [rad], and the drift of the
-heading [rad/s] (see landmarks.py). The tilts die out with a time constant; they carry what all features of a picture,
-and of the next ones, have in common: a swaying trunk misjudged by half a degree moves every far feature by
-decimetres in the same direction. The drift is the bias of the IMU.
+State: x, y [m], yaw [rad] of base_footprint in map, the error of the camera's pose as a small rotation [rad], and the
+drift of the heading [rad/s] (see landmarks.py). The camera's error dies out with a time constant; it carries what all
+features of a picture, and of the next ones, have in common: a swaying trunk misjudged by half a degree moves every far
+feature by decimetres in the same direction. The drift is the bias of the IMU.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_vision.features import Feature, FeatureClass
 from tulip_worldmodel.landmark_association import Observation, associate
-from tulip_worldmodel.landmarks import CROSSINGS
+from tulip_worldmodel.landmarks import CROSSINGS, ERROR, STATES
 from tulip_worldmodel.localization_parameters import LocalizationParameters
 from tulip_worldmodel.lost import LostDetector
 from tulip_worldmodel.mahalanobis import distances_and_determinants, gate
@@ -38,11 +38,13 @@ class Outcome:
         rejected: Indices of the observations that were not used, with the reason.
         explained: How many were used.
         log_likelihood: Of the picture's features, given the hypothesis, by its best association.
+        nearest: See `Association`.
     """
 
     rejected: tuple[tuple[int, str], ...]
     explained: int
     log_likelihood: float
+    nearest: tuple[tuple[float, int], ...]
 
 
 class PoseFilter:
@@ -60,11 +62,14 @@ class PoseFilter:
         self.detector = LostDetector(parameters)
         self.pictures = 0
         """In which landmarks were found."""
+        self.side = 0.0
+        """Nats by which poles speak for this side of the field and against the other (side.py)."""
         self._unexplained_time = 0.0  # [s] with features of which none could be used
-        self._filter = ExtendedKalmanFilter(dim_x=6, dim_z=2)
-        self._filter.x = np.array([pose.x, pose.y, pose.yaw, 0.0, 0.0, 0.0])
-        self._filter.P = np.diag(np.square([*spreads, p.tilt_spread, p.tilt_spread, p.drift_spread]))
-        self._filter.B = np.eye(6)
+        self._camera_variances = np.square([p.pose_elevation_spread, p.pose_elevation_spread, p.pose_azimuth_spread])
+        self._filter = ExtendedKalmanFilter(dim_x=STATES, dim_z=2)
+        self._filter.x = np.array([pose.x, pose.y, pose.yaw, 0.0, 0.0, 0.0, 0.0])
+        self._filter.P = np.diag([*np.square(spreads), *self._camera_variances, p.drift_spread**2])
+        self._filter.B = np.eye(STATES)
 
     @property
     def pose(self) -> Pose2D:
@@ -78,13 +83,13 @@ class PoseFilter:
         return np.array(self._filter.P[:3, :3])
 
     @property
-    def tilt(self) -> Array:
-        """(2,) estimated roll and pitch of the camera beyond what its pose says [rad]."""
-        return np.array(self._filter.x[3:5])
+    def camera_error(self) -> Array:
+        """(3,) estimated rotation about x, y, z of base_footprint by which the camera's pose errs [rad]."""
+        return np.array(self._filter.x[ERROR])
 
-    def predict(self, moved: Increment) -> None:
-        """Move with dead reckoning."""
-        state, transition, noise = self._motion(moved)
+    def predict(self, moved: Increment, scale: float = 1.0) -> None:
+        """Move with dead reckoning; the camera's pose errs by so many times what vision says (noise_scale.py)."""
+        state, transition, noise = self._motion(moved, scale)
         self._filter.F = transition
         self._filter.Q = noise
         self._filter.predict(u=state - transition @ self._filter.x)  # so that F x + B u is the exact motion
@@ -92,7 +97,7 @@ class PoseFilter:
 
     def predicted(self, moved: Increment) -> tuple[Pose2D, Array]:
         """Return pose and (3, 3) covariance after a movement, without changing the filter."""
-        state, transition, noise = self._motion(moved)
+        state, transition, noise = self._motion(moved, 1.0)
         covariance = (transition @ self._filter.P @ transition.T + noise)[:3, :3]
         pose = Pose2D(float(state[0]), float(state[1]), wrap_angle(float(state[2])))
         return pose, np.asarray((covariance + covariance.T) / 2.0)
@@ -108,7 +113,7 @@ class PoseFilter:
             self._filter.x,
             self._filter.P,
             observations,
-            [self._false_rate(observation.feature) for observation in observations],
+            [self.false_rate(observation.feature) for observation in observations],
             [LINE_CLUTTER if observation.feature.kind is FeatureClass.LINE else 1.0 for observation in observations],
             self._parameters.gate_probability,
             self._parameters.association_odds,
@@ -128,21 +133,36 @@ class PoseFilter:
         self.detector.add(explained, unexplained)
         self.pictures += explained > 0
         self._unexplained_time = 0.0 if explained else self._unexplained_time + (since_last if observations else 0.0)
-        return Outcome(tuple(rejected), explained, association.log_likelihood)
+        return Outcome(tuple(rejected), explained, association.log_likelihood, association.nearest)
 
-    def _motion(self, moved: Increment) -> tuple[Array, Array, Array]:
+    def absorb(self, other: PoseFilter, share: float) -> None:
+        """Become the Gaussian with the first two moments of a mixture of this hypothesis and another.
+
+        Args:
+            other: The other hypothesis.
+            share: Its weight, 0 to 1; that of this one is the rest.
+        """
+        off = other._filter.x - self._filter.x
+        off[2] = wrap_angle(float(off[2]))
+        self._filter.x = self._filter.x + share * off
+        spread = share * (1.0 - share) * np.outer(off, off)
+        self._filter.P = (1.0 - share) * self._filter.P + share * other._filter.P + spread
+        self._tidy()
+
+    def _motion(self, moved: Increment, scale: float) -> tuple[Array, Array, Array]:
         """Return the state after a movement, its Jacobian and the noise added."""
         p = self._parameters
-        x, y, yaw, roll, pitch, drift = self._filter.x.tolist()
+        x, y, yaw, roll, pitch, turn, drift = self._filter.x.tolist()
         c, s = math.cos(yaw), math.sin(yaw)
         step_x, step_y = c * moved.pose.x - s * moved.pose.y, s * moved.pose.x + c * moved.pose.y
-        fade = math.exp(-moved.duration / p.tilt_time)
+        fade = math.exp(-moved.duration / p.pose_error_time)
         keep = math.exp(-moved.duration / p.drift_time)
         turned = yaw + moved.pose.yaw + drift * moved.duration
-        state = np.array([x + step_x, y + step_y, wrap_angle(turned), roll * fade, pitch * fade, drift * keep])
-        transition = np.diag([1.0, 1.0, 1.0, fade, fade, keep])
+        error = (roll * fade, pitch * fade, turn * fade)
+        state = np.array([x + step_x, y + step_y, wrap_angle(turned), *error, drift * keep])
+        transition = np.diag([1.0, 1.0, 1.0, fade, fade, fade, keep])
         transition[0, 2], transition[1, 2] = -step_y, step_x
-        transition[2, 5] = moved.duration
+        transition[2, 6] = moved.duration
         position = (
             p.position_noise_per_metre**2 * moved.distance
             + p.position_noise_per_radian**2 * moved.turned
@@ -156,15 +176,33 @@ class PoseFilter:
         if self._unexplained_time > p.lost_time or self.detector.lost:
             position += p.lost_position_noise**2 * moved.duration
             heading += p.lost_heading_noise**2 * moved.duration
-        tilt = p.tilt_spread**2 * (1.0 - fade**2)
+        camera = self._camera_variances * scale**2 * (1.0 - fade**2)
         wander = p.drift_spread**2 * (1.0 - keep**2)
-        noise = np.diag([position, position, heading, tilt, tilt, wander])
+        noise = np.diag([position, position, heading, *camera, wander])
         if moved.slip is not None:
-            turn = np.array([[c, -s], [s, c]])
-            noise[:2, :2] += turn @ moved.slip @ turn.T
+            to_map = np.array([[c, -s], [s, c]])
+            noise[:2, :2] += to_map @ moved.slip @ to_map.T
         return state, transition, noise
 
-    def _false_rate(self, feature: Feature) -> float:
+    def turn_round(self) -> None:
+        """Become the hypothesis that the robot is at the mirror image: turned by pi about the field's centre."""
+        x, y, yaw = self._filter.x[:3]
+        self._filter.x[:3] = -x, -y, wrap_angle(float(yaw) + math.pi)
+        turn = np.diag([-1.0, -1.0, *np.ones(STATES - 2)])
+        self._filter.P = turn @ self._filter.P @ turn
+        self.side = -self.side
+
+    def distance(self, observation: Observation) -> float:
+        """Return the squared Mahalanobis distance of an observation to its nearest candidate, infinite without one."""
+        possible = observation.possible(self._filter.x)
+        if not len(possible):
+            return math.inf
+        innovations, jacobians, noises = observation.linearize(self._filter.x, possible)
+        spreads = jacobians @ self._filter.P @ jacobians.transpose(0, 2, 1) + noises
+        return float(distances_and_determinants(innovations, spreads)[0].min())
+
+    def false_rate(self, feature: Feature) -> float:
+        """Return the share of such features that show no landmark."""
         p = self._parameters
         return p.false_rate_crossing if feature.kind in CROSSINGS else p.false_rate_other
 

@@ -94,7 +94,7 @@ class SeedFinder:
         poses = poses[(np.abs(poses[:, :2]) < self._reach).all(axis=1)]
         if not len(poses):
             return ()
-        scores = self.heading_prior(poses[:, 2], heading)
+        scores = self.heading_priors(poses[:, 2], heading)
         for point in points:
             scores -= self._point_cost(poses, point)
         for piece in pieces:
@@ -108,7 +108,11 @@ class SeedFinder:
                     break
         return tuple(seeds)
 
-    def heading_prior(self, yaws: Array, heading: float) -> Array:
+    def heading_prior(self, yaw: float, heading: float) -> float:
+        """Return the log-density of one heading; see `heading_priors`."""
+        return float(self.heading_priors(np.array([yaw]), heading)[0])
+
+    def heading_priors(self, yaws: Array, heading: float) -> Array:
         """Return (n,) log-density of headings, 0 at its peak: that of the IMU, or any if it was switched off between.
 
         Args:

@@ -44,7 +44,9 @@ class Observer:
 class Sighting:
     """One feature of a movable object, with the noise that the filter shall believe."""
 
-    def __init__(self, feature: Feature, observer: Observer, height: float, extra_spread: tuple[float, float]) -> None:
+    def __init__(
+        self, feature: Feature, observer: Observer, height: float, extra_spread: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
         """Prepare a sighting.
 
         Args:
@@ -85,6 +87,23 @@ class Sighting:
         rotation = self.observer.pose.rotation()
         jacobian = rotation @ by_ray[0] @ by_angles[0]
         return np.array(self.observer.pose.transform(point[0])), jacobian @ self.noise @ jacobian.T
+
+
+def lasting_spread(spread: float, lasts: float, period: float) -> float:
+    """Return what must be added to an error's standard deviation because successive measurements share it.
+
+    An error that dies out with a time constant T, sampled every dt, averages out like white noise whose variance is
+    coth(dt / 2T) times larger: a filter that takes it for white must be told that one.
+
+    Args:
+        spread: Standard deviation of the error.
+        lasts: T [s].
+        period: dt [s]; 0 for a first measurement.
+
+    Returns:
+        The standard deviation e with spread^2 + e^2 = spread^2 coth(dt / 2T).
+    """
+    return 0.0 if period <= 0.0 else spread * math.sqrt(1.0 / math.tanh(0.5 * period / lasts) - 1.0)
 
 
 def in_view(features: Features, angles: Array, margin: float) -> bool:

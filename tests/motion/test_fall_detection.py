@@ -16,17 +16,12 @@ TICKS = round(P.fall_confirm_time / P.control_period)
 STILL = np.zeros(3)
 LEVEL = np.eye(3)
 BELOW = np.array([P.zmp_forward, 0.0])
-
-
-def soles() -> np.ndarray:
-    both = np.stack([np.eye(4), np.eye(4)])
-    both[0, 1, 3], both[1, 1, 3] = 0.12, -0.12
-    return both
+SOLES = ((0.0, 0.12, 0.0), (0.0, -0.12, 0.0))
 
 
 def ask(rotation: np.ndarray, rate: np.ndarray, dcm: np.ndarray, ticks: int = TICKS) -> str:
     detector = FallDetector(P)
-    return [detector.is_falling(rotation, rate, dcm, soles()) for _ in range(ticks)][-1]
+    return [detector.is_falling(rotation, rate, dcm, SOLES) for _ in range(ticks)][-1]
 
 
 @pytest.mark.parametrize("yaw", [0.0, 2.0])
@@ -55,8 +50,8 @@ def test_a_sign_counts_only_when_it_lasts() -> None:
     assert ask(LEVEL, rate, BELOW, TICKS - 1) == ""
     detector = FallDetector(P)
     for _ in range(3 * TICKS):
-        assert detector.is_falling(LEVEL, rate, BELOW, soles()) == ""
-        assert detector.is_falling(LEVEL, STILL, BELOW, soles()) == ""
+        assert detector.is_falling(LEVEL, rate, BELOW, SOLES) == ""
+        assert detector.is_falling(LEVEL, STILL, BELOW, SOLES) == ""
 
 
 def test_a_dcm_out_of_reach_needs_a_lean_besides() -> None:
@@ -72,7 +67,7 @@ def test_a_dcm_out_of_reach_needs_a_lean_besides() -> None:
     [((0.34, 0.1), (0.3, 0.0)), ((0.04, 0.32), (0.0, 0.2)), ((-0.06, -0.22), (-0.1, -0.1)), ((0.04, 0.0), (0.0, 0.0))],
 )
 def test_distance_from_the_feet_is_zero_between_them(dcm: tuple[float, float], expected: tuple[float, float]) -> None:
-    assert beyond_feet(LEVEL, np.array(dcm), soles(), 0.04) == pytest.approx(expected, abs=1e-12)
+    assert beyond_feet(LEVEL, np.array(dcm), SOLES, 0.04) == pytest.approx(expected, abs=1e-12)
 
 
 def test_upright_again_only_straight_still_high_and_on_both_feet() -> None:

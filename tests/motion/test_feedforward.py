@@ -21,7 +21,7 @@ BASE = np.array([POSTURE.base_x, 0.0, POSTURE.base_height])
 
 
 def solver() -> InverseKinematics:
-    kinematics = InverseKinematics(MODEL, 20.0, 20.0, 1e-9, ROBOT.position_limits[:, :12])
+    kinematics = InverseKinematics(MODEL, 20.0, 20.0, ROBOT.position_limits[:, :12])
     kinematics.reset(np.eye(3), BASE, POSTURE.joint_positions[:12])
     return kinematics
 

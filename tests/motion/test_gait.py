@@ -15,7 +15,7 @@ from tulip_motion.gait import SwingFoot, sole_point
 from tulip_motion.interface import Side
 from tulip_motion.kick_path import cosine_profile
 from tulip_motion.parameters import MotionParameters
-from tulip_motion.stabilizer import stabilize
+from tulip_motion.stabilizer import SupportArea, stabilize
 
 P = MotionParameters()
 velocities = st.tuples(st.floats(-0.3, 0.6), st.floats(-0.2, 0.2), st.floats(-1.0, 1.0))
@@ -88,7 +88,7 @@ RIGHT = Footstep(Side.RIGHT, Pose2D(0.05, -0.12, 0.0))
 
 @given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.booleans())
 def test_commanded_zmp_stays_inside_the_support(x: float, y: float, both: bool) -> None:
-    balance = stabilize(P, (0.0, 0.0), (0.0, 0.0), (x, y), LEFT, RIGHT if both else None)
+    balance = stabilize(SupportArea.of(P, LEFT, RIGHT if both else None), (0.0, 0.0), (0.0, 0.0), (x, y))
     share = balance.right_share
     left, right = (np.array(sole_point(foot, P.zmp_forward, P.zmp_inward)) for foot in (LEFT, RIGHT))
     offset = np.array(balance.zmp) - ((1 - share) * left + share * right)
@@ -106,7 +106,7 @@ def test_commanded_zmp_stays_inside_the_support(x: float, y: float, both: bool) 
 
 def test_zmp_feedback_is_exact_where_it_is_not_clipped() -> None:
     aim = sole_point(LEFT, P.zmp_forward, P.zmp_inward)
-    balance = stabilize(P, aim, aim, (aim[0] + 0.01, aim[1] - 0.01), LEFT, None)
+    balance = stabilize(SupportArea.of(P, LEFT, None), aim, aim, (aim[0] + 0.01, aim[1] - 0.01))
     gain = 1.0 + P.dcm_gain
     assert balance.zmp == pytest.approx((aim[0] + gain * 0.01, aim[1] - gain * 0.01))
     assert balance.cmp == balance.zmp

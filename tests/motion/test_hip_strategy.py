@@ -18,10 +18,12 @@ from tulip_motion.interface import Side
 from tulip_motion.inverse_kinematics import InverseKinematics
 from tulip_motion.motion import with_fixed_head
 from tulip_motion.parameters import MotionParameters
+from tulip_motion.stabilizer import SupportArea
 
 P = MotionParameters()
 ROBOT = with_fixed_head(load_robot())
 FEET = (Footstep(Side.LEFT, Pose2D(0.0, 0.14, 0.0)), Footstep(Side.RIGHT, Pose2D(0.0, -0.14, 0.0)))
+ON_LEFT, ON_BOTH = SupportArea.of(P, FEET[0], None), SupportArea.of(P, *FEET)
 AIM = (P.zmp_forward, FEET[0].pose.y)
 WEIGHT = 226.0  # [N]
 
@@ -39,20 +41,20 @@ def zmp_of(dynamics: Dynamics) -> Any:
 def on_left_foot(task_acceleration: np.ndarray) -> Dynamics:
     """Return the dynamics of a robot at rest on both feet that accelerates."""
     posture = standing_posture(load_robot())
-    kinematics = InverseKinematics(floating_model(ROBOT), 20.0, 20.0, 1e-9, ROBOT.position_limits[:, :12])
+    kinematics = InverseKinematics(floating_model(ROBOT), 20.0, 20.0, ROBOT.position_limits[:, :12])
     kinematics.reset(np.eye(3), np.array([posture.base_x, 0.0, posture.base_height]), posture.joint_positions[:12])
     kinematics.update_jacobian(Side.LEFT)
     return inverse_dynamics(kinematics, np.zeros(18), kinematics.solve_acceleration(task_acceleration))
 
 
 def test_inside_the_soles_the_torso_is_left_alone() -> None:
-    assert turn_for_balance(P, wrench(AIM[0] + 0.05, AIM[1] - 0.05), FEET[0], None) == (0.0, 0.0)
-    assert turn_for_balance(P, wrench(AIM[0], 0.0), *FEET) == (0.0, 0.0)
-    assert turn_for_balance(P, wrench(AIM[0], 0.0), FEET[0], None) != (0.0, 0.0)
+    assert turn_for_balance(wrench(AIM[0] + 0.05, AIM[1] - 0.05), ON_LEFT) == (0.0, 0.0)
+    assert turn_for_balance(wrench(AIM[0], 0.0), ON_BOTH) == (0.0, 0.0)
+    assert turn_for_balance(wrench(AIM[0], 0.0), ON_LEFT) != (0.0, 0.0)
 
 
 def test_in_the_air_there_is_nothing_to_push_against() -> None:
-    assert turn_for_balance(P, wrench(1.0, 1.0, force=1.0), FEET[0], None) == (0.0, 0.0)
+    assert turn_for_balance(wrench(1.0, 1.0, force=1.0), ON_LEFT) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("beyond", [(0.02, 0.0), (-0.02, 0.0), (0.0, 0.02), (0.0, -0.02), (0.02, -0.02)])
@@ -66,7 +68,7 @@ def test_the_torso_brings_the_zmp_back_to_the_edge_of_the_sole(beyond: tuple[flo
     acceleration = np.zeros(12)
     acceleration[:2] = 9.81 / 0.71 * (zmp_of(rest) - edge - beyond)
     asked = on_left_foot(acceleration)
-    turn = turn_for_balance(P, asked.wrench, FEET[0], None)
+    turn = turn_for_balance(asked.wrench, ON_LEFT)
     acceleration[3:5] = turn
     given = on_left_foot(acceleration)
     before, after = zmp_of(asked) - foot[:2], zmp_of(given) - foot[:2]
@@ -77,5 +79,5 @@ def test_the_torso_brings_the_zmp_back_to_the_edge_of_the_sole(beyond: tuple[flo
 
 def test_no_more_is_given_up_than_the_greatest_lean() -> None:
     most = P.torso_stiffness * P.max_lean
-    assert turn_for_balance(P, wrench(9.0, 9.0), FEET[0], None) == (-most, most)
-    assert turn_for_balance(P, wrench(-9.0, -9.0), FEET[0], None) == (most, -most)
+    assert turn_for_balance(wrench(9.0, 9.0), ON_LEFT) == (-most, most)
+    assert turn_for_balance(wrench(-9.0, -9.0), ON_LEFT) == (most, -most)

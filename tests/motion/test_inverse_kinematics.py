@@ -42,7 +42,7 @@ rates = st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3)
 
 
 def solver() -> InverseKinematics:
-    kinematics = InverseKinematics(MODEL, 20.0, 20.0, 1e-9, LIMITS)
+    kinematics = InverseKinematics(MODEL, 20.0, 20.0, LIMITS)
     kinematics.reset(np.eye(3), BASE, POSTURE.joint_positions[:12])
     return kinematics
 

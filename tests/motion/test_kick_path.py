@@ -56,8 +56,8 @@ def test_a_moves_velocity_and_acceleration_are_its_derivatives(profile: Profile)
     h = 1e-5
     for time in (0.05, 0.15, 0.28):
         before, now, after = (move.evaluate(time + step) for step in (-h, 0.0, h))
-        np.testing.assert_allclose((after.position - before.position) / (2 * h), now.velocity, atol=1e-6)
-        np.testing.assert_allclose((after.velocity - before.velocity) / (2 * h), now.acceleration, atol=1e-5)
+        np.testing.assert_allclose(np.subtract(after.position, before.position) / (2 * h), now.velocity, atol=1e-6)
+        np.testing.assert_allclose(np.subtract(after.velocity, before.velocity) / (2 * h), now.acceleration, atol=1e-5)
         assert (after.yaw - before.yaw) / (2 * h) == pytest.approx(now.yaw_rate, abs=1e-6)
 
 

@@ -39,7 +39,7 @@ def test_standing_as_usual_has_nothing_to_say() -> None:
 def test_com_above_the_reach_of_the_legs_is_told_by_the_inverse_kinematics() -> None:
     robot = with_fixed_head(load_robot())
     posture = standing_posture(load_robot())
-    kinematics = InverseKinematics(floating_model(robot), 20.0, 20.0, 1e-6, robot.position_limits[:, :12])
+    kinematics = InverseKinematics(floating_model(robot), 20.0, 20.0, robot.position_limits[:, :12])
     kinematics.reset(np.eye(3), np.array([0.0, 0.0, posture.base_height]), posture.joint_positions[:12])
     left, right = (sole.copy() for sole in kinematics.sole_positions)
     anchor, other = Pose2D(float(left[0]), float(left[1])), Pose2D(float(right[0]), float(right[1]))

@@ -108,7 +108,7 @@ def largest_errors(kinematics: InverseKinematics, step: Step, ticks: range) -> n
 def test_ten_minutes_of_walking_end_as_exact_as_they_began() -> None:
     robot = with_fixed_head(load_robot())
     posture = standing_posture(load_robot())
-    kinematics = InverseKinematics(floating_model(robot), 20.0, 20.0, 1e-6, robot.position_limits[:, :12])
+    kinematics = InverseKinematics(floating_model(robot), 20.0, 20.0, robot.position_limits[:, :12])
     kinematics.reset(np.eye(3), np.array([0.0, 0.0, posture.base_height]), posture.joint_positions[:12])
     first = Step(0)
     for _ in range(500):  # come to where the walk begins

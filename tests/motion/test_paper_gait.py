@@ -111,8 +111,8 @@ def test_velocities_and_accelerations_are_derivatives(
         return
     step = step_between(shape, Side.LEFT, start, Pose2D(0.05, -0.22, 0.1), turn, target, LIMITS)
     earlier, now, later = (step.foot(time + k * h) for k in (-1, 0, 1))
-    np.testing.assert_allclose(now.velocity, (later.position - earlier.position) / (2 * h), atol=1e-5)
-    np.testing.assert_allclose(now.acceleration, (later.velocity - earlier.velocity) / (2 * h), atol=1e-3)
+    np.testing.assert_allclose(now.velocity, np.subtract(later.position, earlier.position) / (2 * h), atol=1e-5)
+    np.testing.assert_allclose(now.acceleration, np.subtract(later.velocity, earlier.velocity) / (2 * h), atol=1e-3)
     assert now.yaw_rate == pytest.approx((later.yaw - earlier.yaw) / (2 * h), abs=1e-6)
     assert now.yaw_acceleration == pytest.approx((later.yaw_rate - earlier.yaw_rate) / (2 * h), abs=1e-4)
     coms = [np.array(step.com(time + k * h)) for k in (-1, 0, 1)]

@@ -12,7 +12,7 @@ from tulip_description.robot import load_robot
 from tulip_motion.footsteps import Footstep, foot_beside
 from tulip_motion.interface import MotionMode, Side
 from tulip_motion.parameters import MotionParameters
-from tulip_motion.stabilizer import nearest_in_support
+from tulip_motion.stabilizer import SupportArea
 from tulip_motion.walking import must_step
 from tulip_sim.bench.body import Body
 
@@ -43,7 +43,7 @@ def _beyond(unit: tuple[float, float], way: float) -> tuple[float, float]:
 
 
 def _outside(point: tuple[float, float]) -> bool:
-    nearest, _ = nearest_in_support(P, point, *FEET)
+    nearest, _ = SupportArea.of(P, *FEET).nearest(point)
     return math.dist(nearest, point) > 1e-9
 
 

@@ -19,7 +19,7 @@ from tulip_motion.footsteps import Footstep
 from tulip_motion.interface import Side
 from tulip_motion.motion import with_fixed_head
 from tulip_motion.parameters import MotionParameters
-from tulip_motion.state_estimator import Estimate, StateEstimator
+from tulip_motion.state_estimator import Estimate, StateEstimator, centre_of_pressure
 
 ROBOT = load_robot()
 MODEL = floating_model(with_fixed_head(ROBOT))
@@ -103,17 +103,20 @@ def test_base_lies_and_moves_such_that_the_feet_that_carry_stay_on_the_ground(le
     np.testing.assert_allclose(moving, 0.0, atol=1e-12)
     np.testing.assert_allclose(seen.angular_velocity, seen.base_rotation @ reading.imu_angular_velocity, atol=1e-12)
     for sole, frame in zip(seen.soles, frames, strict=True):
-        np.testing.assert_allclose(sole, data.oMf[frame].homogeneous, atol=1e-12)
+        np.testing.assert_allclose(sole.transform, data.oMf[frame].homogeneous, atol=1e-12)
 
 
 def test_centre_of_pressure_is_the_mean_of_the_cells_weighted_by_their_forces() -> None:
     reading = sensors(4, quaternion(pin.exp3(np.array([0.0, 0.0, 0.7]))))
     seen = estimate(reading, 0.5, np.eye(3), (Pose2D(0.3, 0.2), Pose2D(0.25, -0.05)))
-    places = np.concatenate([CELLS[side] @ seen.soles[side, :2, :2].T + seen.soles[side, :2, 3] for side in (0, 1)])
-    np.testing.assert_allclose(seen.zmp, np.average(places, axis=0, weights=reading.foot_cells.ravel()), atol=1e-12)
+    soles = [sole.transform[:2] for sole in seen.soles]
+    places = np.concatenate([cells @ sole[:, :2].T + sole[:, 3] for cells, sole in zip(CELLS, soles, strict=True)])
+    centre = centre_of_pressure(seen, 10.0)
+    np.testing.assert_allclose(centre, np.average(places, axis=0, weights=reading.foot_cells.ravel()), atol=1e-12)
     np.testing.assert_allclose(seen.loads, reading.foot_cells.sum(axis=1), atol=1e-12)
 
 
 def test_without_contact_there_is_no_centre_of_pressure() -> None:
     reading = Sensors(**{**vars(sensors(5, np.array([0.0, 0.0, 0.0, 1.0]))), "foot_cells": np.ones((2, 4))})
-    assert np.isnan(estimate(reading, 0.5, np.eye(3), (Pose2D(), Pose2D())).zmp).all()
+    seen = estimate(reading, 0.5, np.eye(3), (Pose2D(), Pose2D()))
+    assert np.isnan(centre_of_pressure(seen, 10.0)).all()

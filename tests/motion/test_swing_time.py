@@ -52,9 +52,10 @@ def test_position_and_velocity_are_continuous_and_belong_together(
     motions, _ = swing(changes)
     for before, after in itertools.pairwise(motions):
         # Within a tick the jerk is constant: position and velocity are those of the integral of the acceleration.
-        jerk = (after.acceleration - before.acceleration) / DT
-        velocity = before.velocity + DT * before.acceleration + DT**2 / 2.0 * jerk
-        position = before.position + DT * before.velocity + DT**2 / 2.0 * before.acceleration + DT**3 / 6.0 * jerk
+        start, speed, acceleration = map(np.array, (before.position, before.velocity, before.acceleration))
+        jerk = (after.acceleration - acceleration) / DT
+        velocity = speed + DT * acceleration + DT**2 / 2.0 * jerk
+        position = start + DT * speed + DT**2 / 2.0 * acceleration + DT**3 / 6.0 * jerk
         np.testing.assert_allclose(after.velocity, velocity, atol=1e-9)
         np.testing.assert_allclose(after.position, position, atol=1e-9)
 

@@ -10,7 +10,7 @@ import pytest
 
 from tulip_description.planar import Pose2D
 from tulip_motion.interface import HeadCommand, HeadMode
-from tulip_sim.bench import head
+from tulip_sim.bench import head, head_trials
 from tulip_sim.bench.head_play import HeadPlay
 from tulip_sim.bench.runner import Row
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.sim
 @pytest.fixture(scope="module")
 def rows() -> list[Row]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(head, "SHARE_DURATION", 8.0)
+        patch.setattr(head_trials, "SHARE_DURATION", 8.0)
         shares = [head.measure("share", gaze, 3) for gaze in ("planner", "fixed glance")]
     return [
         head.measure("coverage", False),

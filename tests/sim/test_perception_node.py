@@ -19,6 +19,7 @@ from tulip_ros.time import header, stamp_of
 from tulip_sim.match_graph import trial_plan
 from tulip_sim.messages import truth_from_message, truth_to_message
 from tulip_sim.parameters import WorldParameters
+from tulip_sim.perception import PerceptionParameters
 from tulip_sim.perception_node import PerceptionNode
 from tulip_sim.referee import Referee, RefereeParameters
 from tulip_sim.scenario import make_scenario
@@ -74,7 +75,7 @@ def test_node_turns_the_truth_into_features_with_the_pose_of_odometry(world: Wor
 
 
 def test_plan_with_perception_has_no_vision_and_no_pictures() -> None:
-    plan = {start.name: start for start in trial_plan(1, perception=True)}
+    plan = {start.name: start for start in trial_plan(1, perception=PerceptionParameters())}
     assert "vision" not in plan
     assert not plan["perception"].entry.playing
     assert plan["driver"].parameters["camera"] is False

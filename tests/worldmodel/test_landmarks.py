@@ -22,6 +22,7 @@ states = st.tuples(
     st.floats(-0.05, 0.05),
     st.floats(-0.05, 0.05),
     st.floats(-0.05, 0.05),
+    st.floats(-0.05, 0.05),
 ).map(np.array)
 
 
@@ -85,7 +86,7 @@ def test_jacobian_of_rays_on_a_plane_agrees_with_finite_differences() -> None:
 
 def test_piece_on_the_line_has_no_misfit_in_either_order_of_its_ends() -> None:
     lines = lines_of([LineSegment((2.0, -2.0), (2.0, 2.0))])
-    state = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0])
+    state = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 0.0])
     seen, _ = point_directions(state, np.array([[2.0, -1.0], [2.0, 1.5]]), CAMERA)
     for ends in (seen, seen[::-1]):
         piece = LinePiece(ends, CAMERA)

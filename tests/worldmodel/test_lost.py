@@ -55,6 +55,14 @@ def test_a_share_of_false_features_as_expected_raises_no_alarm_in_ten_minutes() 
         assert not detector.lost
 
 
+def test_false_findings_on_bare_carpet_raise_no_alarm_in_ten_minutes() -> None:
+    rng = np.random.default_rng(0)
+    detector = LostDetector(P)
+    for _ in range(9000):
+        detector.add(0, int(rng.poisson(0.1)))  # a few times as often as vision does
+        assert not detector.lost
+
+
 def test_chance_matches_only_are_noticed_within_3_seconds() -> None:
     for seed in range(20):
         rng = np.random.default_rng(seed)

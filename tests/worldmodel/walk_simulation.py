@@ -17,7 +17,6 @@ from tulip_description.field import CrossingKind, Field, load_field
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.interface import Odometry
 from tulip_vision.features import Feature, FeatureClass, Features
-from tulip_vision.view import SpreadParameters
 from tulip_worldmodel.localization_parameters import LocalizationParameters
 
 Array = NDArray[np.float64]
@@ -47,6 +46,7 @@ class Errors:
     miss: float = 0.15
     false_crossing: float = 1.0 / 7.0  # share of all crossings reported
     vision: bool = True
+    claimed: float = 1.0  # share of a feature's true spread that vision claims; less than one for a conceited one
 
 
 ROUGH = LocalizationParameters(
@@ -57,10 +57,10 @@ ROUGH = LocalizationParameters(
     heading_noise_per_radian=math.radians(2.0),
     heading_noise_per_second=math.radians(0.3),
     drift_spread=0.02,
-    tilt_spread=math.radians(0.6),
-    extra_azimuth_spread=math.radians(0.4),
-    extra_elevation_spread=math.radians(0.3),
-    landmark_spread=0.03,
+    pose_azimuth_spread=Errors.azimuth_bias,
+    pose_elevation_spread=Errors.tilt_spread,
+    pose_error_time=Errors.tilt_time,
+    landmark_spread=Errors.landmark_spread,
 )
 """What fits the errors of this walk: feet that slip, an IMU that drifts, play in the neck, lines painted by hand."""
 
@@ -75,12 +75,6 @@ class Moment:
     features: Features | None
     ball: Array | None
     ball_velocity: Array | None
-
-
-def claimed_spreads(own: float) -> tuple[float, float]:
-    """Return what vision claims for azimuth and elevation [rad]: a feature's own error and the camera pose's."""
-    vision = SpreadParameters()
-    return math.hypot(own, vision.pose_azimuth), math.hypot(own, vision.pose_elevation)
 
 
 WAYPOINTS = ((1.5, 1.0), (3.2, -0.8), (0.5, -2.0), (-2.0, -1.0), (-1.0, 1.8), (2.5, 0.5), (-3.0, 1.5))
@@ -231,10 +225,15 @@ class Simulation:
     def feature(self, kind: FeatureClass, azimuth: float, elevation: float) -> Feature:
         """Return a feature with noise."""
         noise = self.rng.normal(size=2) * self.errors.angle_spread
-        spreads = (self.errors.angle_spread,) * 2
-        if kind not in (FeatureClass.BALL, FeatureClass.OPPONENT):
-            spreads = claimed_spreads(self.errors.angle_spread)
+        spreads = self.claimed_spreads(elevation)
         return Feature(kind, wrap_angle(azimuth + noise[0]), elevation + noise[1], *spreads, 0.9)
+
+    def claimed_spreads(self, elevation: float) -> tuple[float, float]:
+        """Return the spreads of azimuth and elevation [rad]: a feature's own error and that of the camera's pose."""
+        errors = self.errors
+        sideways = 0.0 if math.isnan(elevation) else errors.tilt_spread * math.tan(elevation)
+        azimuth = math.hypot(errors.angle_spread, errors.azimuth_bias, sideways)
+        return errors.claimed * azimuth, errors.claimed * math.hypot(errors.angle_spread, errors.tilt_spread)
 
     def lines(self, pose: Pose2D, tilt: Array, view: Array) -> list[Feature]:
         """Return the parts of lines inside the picture, cut to 6 m range."""

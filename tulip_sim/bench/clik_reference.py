@@ -46,7 +46,7 @@ class Instant:
     def foot_places(self) -> tuple[pin.SE3, pin.SE3]:
         """Return where the left and the right sole shall be."""
         fixed = FootMotion.resting(self.anchor)
-        feet = [pin.SE3(rotation_z(foot.yaw), foot.position) for foot in (fixed, self.target.foot)]
+        feet = [pin.SE3(rotation_z(foot.yaw), np.array(foot.position)) for foot in (fixed, self.target.foot)]
         return (feet[0], feet[1]) if self.stance is Side.LEFT else (feet[1], feet[0])
 
 

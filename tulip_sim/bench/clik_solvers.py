@@ -30,6 +30,7 @@ from tulip_sim.bench.clik_reference import Instant, WalkReference, legs, legs_mo
 Array = NDArray[np.float64]
 
 DT = MotionParameters().control_period
+PINK_DAMPING = 1e-6  # its quadratic program has no solution at a singular posture without
 SOLES = (frames.LEFT_SOLE, frames.RIGHT_SOLE)
 ROOT = Path(__file__).resolve().parents[2]
 PLACO_ENVIRONMENT = ROOT / ".venv-placo"
@@ -62,7 +63,7 @@ def replay_own(reference: WalkReference, dead_beat: bool = False) -> Replay:
     """
     p, model = MotionParameters(), legs_model()
     gains = (1.0 / DT, 1.0 / DT) if dead_beat else (p.clik_gain_position, p.clik_gain_orientation)
-    kinematics = InverseKinematics(model, *gains, p.clik_damping, legs().position_limits[:, :12])
+    kinematics = InverseKinematics(model, *gains, legs().position_limits[:, :12])
     kinematics.configuration[:] = reference.start
     instants = [at_rest(instant) for instant in reference.instants[1:]] if dead_beat else reference.instants[:-1]
     seconds, postures = [], []
@@ -79,7 +80,7 @@ def replay_own(reference: WalkReference, dead_beat: bool = False) -> Replay:
 
 def at_rest(instant: Instant) -> Instant:
     """Return the same places without velocities."""
-    target, zero = instant.target, np.zeros(3)
+    target, zero = instant.target, (0.0, 0.0, 0.0)
     foot = target.foot._replace(velocity=zero, yaw_rate=0.0)
     return replace(instant, target=target._replace(com_velocity=zero, torso_angular_velocity=zero, foot=foot))
 
@@ -103,14 +104,13 @@ def replay_pink(reference: WalkReference, limited: bool, solver: str | None = No
     wanted = [
         (
             instant.stance,
-            instant.target.com,
+            np.array(instant.target.com),
             pin.SE3(instant.target.torso_rotation, np.zeros(3)),
             instant.foot_places(),
         )
         for instant in reference.instants[1:]
     ]
     limits: list[Any] | None = None if limited else []
-    damping = MotionParameters().clik_damping
     seconds, postures = [], []
     for stance, com_place, torso_place, places in wanted:
         begun = time.perf_counter()
@@ -123,7 +123,7 @@ def replay_pink(reference: WalkReference, limited: bool, solver: str | None = No
             (com, torso, feet[stance.other]),
             DT,
             solver=solver,
-            damping=damping,
+            damping=PINK_DAMPING,
             limits=limits,
             constraints=(feet[stance],),
         )

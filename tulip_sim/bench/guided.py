@@ -1,4 +1,4 @@
-"""A robot that walks from place to place and looks round, in lockstep: all but strategy, which is a script."""
+"""A robot that walks from place to place, in lockstep: legs by a script, head as strategy moves it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_description.field import load_field
 from tulip_description.planar import Pose2D, wrap_angle
-from tulip_motion.interface import HeadCommand, HeadMode, MotionMode, WalkCommand, WalkMode
+from tulip_motion.interface import MotionMode, WalkCommand, WalkMode
+from tulip_sim.bench.strategy_gaze import StrategyGaze
 from tulip_sim.lockstep import Lockstep, Settings
 from tulip_sim.scenario import Scenario
 
@@ -23,7 +25,10 @@ ASIDE = math.radians(50.0)  # a goal further aside is turned to before the robot
 
 
 class GuidedWalk(Lockstep):
-    """Walks to places one after the other by its own estimate of where it is, or stands; the head sweeps the field."""
+    """Walks to places one after the other by its own estimate of where it is, or stands.
+
+    The head follows the ball and glances at landmarks where the gaze planner wants to.
+    """
 
     def __init__(
         self,
@@ -42,7 +47,9 @@ class GuidedWalk(Lockstep):
             settings: Parameters of all cores.
             belief: Where the robot is told to stand; None for where it stands.
         """
+        settings = settings or Settings()
         super().__init__(scenario, seed, settings, belief=belief)
+        self._gaze = StrategyGaze(settings.strategy, load_field())
         self._places = list(places)
         self._next = 0
         self._limp = False
@@ -73,14 +80,15 @@ class GuidedWalk(Lockstep):
         return self.motion.mode is MotionMode.FALLEN
 
     def _decide(self, stamp: int) -> None:
-        """Command legs and head by the script."""
+        """Command the legs by the script, and the head."""
+        world = self.world_model.state(stamp)
+        self._head_command = self._gaze.command(stamp, world)
         if self._limp:
             self.motion.command(WalkCommand(stamp, WalkMode.LIMP))
             return
-        velocity = self._velocity(self.world_model.state(stamp).robot.pose) if self._places else None
+        velocity = self._velocity(world.robot.pose) if self._places else None
         mode = WalkMode.STAND if velocity is None else WalkMode.WALK
         self.motion.command(WalkCommand(stamp, mode, velocity or (0.0, 0.0, 0.0)))
-        self._head_command = HeadCommand(stamp, HeadMode.SEARCH)
 
     def _velocity(self, pose: Pose2D) -> tuple[float, float, float]:
         x, y = self._places[self._next]

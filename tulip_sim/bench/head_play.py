@@ -1,7 +1,8 @@
 """A robot that looks while it is moved about by a script: world model and head movement as they play, fake legs.
 
 The body slides over the field without dynamics, exactly as told; dead reckoning errs. What vision would find comes from
-the truth (seen.py). Timing is that of lockstep.
+the truth (tulip_sim.perception), seen by a camera whose believed pose errs as much as vision says. Timing is that of
+lockstep.
 """
 
 from __future__ import annotations
@@ -12,15 +13,20 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.field import Field, load_field
 from tulip_description.planar import Pose2D
+from tulip_description.posture import standing_posture
 from tulip_description.robot import load_robot
 from tulip_motion.head import HeadMovement, HeadParameters
 from tulip_motion.interface import HeadCommand, HeadMode, Odometry
-from tulip_sim.bench.seen import Seen, SeenParameters
+from tulip_sim.bench.camera_sway import CameraSway
+from tulip_sim.perception import Perception, PerceptionParameters
 from tulip_sim.timing import CAMERA_TICKS, DECISION_TICKS, FEATURE_DELAY_TICKS, SLOW_TICKS, TICK
-from tulip_vision.features import Features
+from tulip_sim.truth import Truth
+from tulip_vision.features import FeatureClass, Features
 from tulip_vision.lens import head_camera_lens
+from tulip_vision.view import SpreadParameters
 from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
 from tulip_worldmodel.world_state import WorldState
 
@@ -28,6 +34,7 @@ Array = NDArray[np.float64]
 Velocity = tuple[float, float, float]
 DECELERATION = 0.3  # [m/s^2] of the rolling ball
 SECONDS = TICK * 1e-3  # [s] of a tick
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
 class HeadPlay:
@@ -52,9 +59,11 @@ class HeadPlay:
             believed: Where the robot is told that it stands; None for the truth.
         """
         self.field: Field = load_field()
-        robot = load_robot()
+        robot = self._robot = load_robot()
+        self._posture = standing_posture(robot)
         self._rng = np.random.default_rng([seed, 4])
-        self.seen = Seen(SeenParameters(), self.field, robot, head_camera_lens(), self._rng)
+        self._perception = Perception(PerceptionParameters(), self.field, robot, head_camera_lens())
+        self._sway = CameraSway(SpreadParameters(), self._rng)
         self._head_movement = HeadMovement(HeadParameters(), robot)
         self._world_model = WorldModel(WorldModelParameters(), self.field, believed or pose)
         self.pose, self._odom, self._distance = pose, Pose2D(), 0.0
@@ -108,11 +117,42 @@ class HeadPlay:
     def _expose(self) -> None:
         since = (self._tick % SLOW_TICKS) * SECONDS
         head = self.head + self._head_velocity * since
-        speed = float(np.abs(self._head_velocity).max())
-        elapsed = CAMERA_TICKS * SECONDS
-        self._waiting = self.seen.picture(self.stamp, elapsed, self.pose, head, speed, self.ball)
-        self.ball_in_picture = self.seen.sees_ball(self.ball_in_footprint(), head)
+        truth = self._truth(head)
+        glimpses = self._perception.in_view(truth)
+        self.ball_in_picture = any(each.kind is FeatureClass.BALL for each in glimpses)
+        noticed = self._perception.noticed(glimpses, truth, self._rng)
+        believed = self._sway.of(self.camera(head), CAMERA_TICKS * SECONDS)
+        self._waiting = self._perception.features(noticed, self.stamp, believed, self._rng)
         self.pictures += 1
+
+    def camera(self, head: Array) -> Array:
+        """Return the (4, 4) camera_optical_frame in base_footprint of the upright robot, given pan and tilt [rad]."""
+        return camera_in_footprint(self._robot, self._posture.base_height, UPRIGHT, float(head[0]), float(head[1]))
+
+    def _truth(self, head: Array) -> Truth:
+        """Return the world as it is, with the robot in its standing posture."""
+        joints, velocities = self._posture.joint_positions.copy(), np.zeros(len(self._posture.joint_positions))
+        joints[-2:], velocities[-2:] = head, self._head_velocity
+        still, half = np.zeros(3), self.pose.yaw / 2.0
+        return Truth(
+            stamp=self.stamp,
+            base_position=np.array([self.pose.x, self.pose.y, self._posture.base_height]),
+            base_orientation=np.array([0.0, 0.0, math.sin(half), math.cos(half)]),
+            base_linear_velocity=still,
+            base_angular_velocity=still,
+            joint_positions=joints,
+            joint_velocities=velocities,
+            ball_position=np.array([*self.ball, self.field.ball_radius]),
+            ball_orientation=np.array(UPRIGHT),
+            ball_linear_velocity=np.array([*self.ball_velocity, 0.0]),
+            ball_angular_velocity=still,
+            keeper=None,
+            keeper_path=(),
+            foot_touches=(0, 0),
+            body_touches=0,
+            keeper_touches=0,
+            poles=True,
+        )
 
     def _odometry(self, velocity: Velocity) -> None:
         forward, left, turn = velocity

@@ -37,6 +37,7 @@ SEARCH = 10.0  # [s] that it has to find itself again
 STAYS = 1.0  # [s] that it must have known its place by then
 FOUND = (0.3, math.radians(10.0))  # [m], [rad] it is found when it errs by less, and does not call itself lost
 MIRRORED = math.radians(150.0)  # [rad] a heading that errs by more, with a place turned about the centre, is mirrored
+CLEAR = 0.7  # [m] from the ball, of ways to walk: nobody kicks it
 MARGIN = 0.8  # [m] from the outer lines, of places to walk to and to be put at
 ENLARGED = 20.0  # ellipses in the picture: in their own size they are points
 BOUND = float(chi2.ppf(0.95, df=3))  # of the NEES of (x, y, yaw): 95 of 100 lie below if the covariance is right
@@ -65,8 +66,9 @@ def walk(seed: int, perception: str = "vision") -> Row:
     off, turn = float(rng.uniform(0.0, START_ERROR[0])), float(rng.uniform(-math.pi, math.pi))
     twist = float(rng.uniform(-START_ERROR[1], START_ERROR[1]))
     belief = Pose2D(start.x + off * math.cos(turn), start.y + off * math.sin(turn), start.yaw + twist)
-    places = [(place.x, place.y) for place in (_place(rng, field) for _ in range(PLACES))]
-    robot = GuidedWalk(_scenario(start, seed, rng, field), seed, places, settings_of(perception), belief)
+    scenario = _scenario(start, seed, rng, field)
+    places = _way_round(start, scenario.ball, rng, field)
+    robot = GuidedWalk(scenario, seed, places, settings_of(perception), belief)
     looks, distance = [], 0.0
     try:
         last = robot.world.truth().footprint
@@ -169,8 +171,9 @@ def summarize(rows: list[Row]) -> list[str]:
     quick = sorted({row["perception"] for row in rows} - {"vision"})
     lines = [
         f"{len(walks)} walks of {DURATION:.0f} s between random places, steered by the robot's own estimate, the head"
-        f" sweeping the field; the start told wrong by up to {START_ERROR[0]} m and"
-        f" {math.degrees(START_ERROR[1]):.0f} deg. {len(carried)} standing robots carried to random places, legs limp,"
+        f" following a ball and glancing where the gaze planner wants to; the start told wrong by up to"
+        f" {START_ERROR[0]} m and {math.degrees(START_ERROR[1]):.0f} deg."
+        f" {len(carried)} standing robots carried to random places, legs limp,"
         " nobody telling them. Half of all without landmark poles: the two halves of the field look alike then, and"
         " only the heading since the start tells them apart. " + _source(quick),
         "",
@@ -225,9 +228,27 @@ def _place(rng: np.random.Generator, field: Field) -> Pose2D:
 
 
 def _scenario(start: Pose2D, seed: int, rng: np.random.Generator, field: Field) -> Scenario:
-    """Return a field with a keeper, whom walks do not meet, and a ball on the border, in nobody's way."""
+    """Return a field with a ball anywhere but at the robot's feet, and a keeper, whom walks do not meet."""
     keeper = Keeper(Pose2D(field.opponent_goal.x - 0.3, float(rng.uniform(-0.7, 0.7)), -math.pi))
-    return Scenario(start, (-field.length / 2.0, field.width / 2.0 + 0.4), keeper, poles=seed % 2 == 0)
+    ball = _place(rng, field)
+    while math.hypot(ball.x - start.x, ball.y - start.y) < CLEAR:
+        ball = _place(rng, field)
+    return Scenario(start, (ball.x, ball.y), keeper, poles=seed % 2 == 0)
+
+
+def _way_round(
+    start: Pose2D, ball: tuple[float, float], rng: np.random.Generator, field: Field
+) -> list[tuple[float, float]]:
+    """Return random places such that the straight ways between them keep clear of the ball."""
+    here, places = np.array([start.x, start.y]), list[tuple[float, float]]()
+    while len(places) < PLACES:
+        place = _place(rng, field)
+        way = np.array([place.x, place.y]) - here
+        along = float(np.clip((np.array(ball) - here) @ way / max(float(way @ way), 1e-9), 0.0, 1.0))
+        if np.linalg.norm(here + along * way - ball) > CLEAR:
+            places.append((place.x, place.y))
+            here = here + way
+    return places
 
 
 def _error(truth: Pose2D, believed: Pose2D) -> Array:
