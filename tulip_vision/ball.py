@@ -2,7 +2,8 @@
 
 A sphere's outline is a circular cone of rays, in any lens: all its unit rays u fulfil u . m = 1 with
 m = c / cos(rho), c the direction of the centre and rho half the angle that the ball fills. So the fit is
-linear and free of the bias of a circle fitted to pixels.
+linear and free of the bias of a circle fitted to pixels. Where the own chest or the picture's edge hides part of the
+outline, the rest is too short an arc to tell place and size: there the size is that of a ball which lies on the ground.
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
 from tulip_vision.patches import patches
 from tulip_vision.segmentation import Colour, Segmentation, belongs
-from tulip_vision.view import Array, View, angles
+from tulip_vision.view import Array, Mask, View, angles
 
 MOST_CANDIDATES = 10
 """The largest orange patches are looked at; a crowd in orange shirts must not cost time without bound."""
+BESIDE = 3
+"""[px] from the own body: an outline nearer than that is the body's, not the ball's."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,8 @@ class BallParameters:
         least_area: Smallest orange patch looked at [px^2].
         size_tolerance: Largest ratio, either way, between the seen radius and the one that fits the place.
         size_slack: Difference of radius that is always allowed [px].
-        least_fill: Share of the disk that must be orange.
+        least_fill: Share of the disk that must be orange, where neither the own body nor the picture's edge hides it.
+        least_outline: Share of the outline that must be seen.
         least_carpet: Share of the points just beside and below the ball that must be carpet or line.
         farthest: Largest distance along the ground [m].
     """
@@ -44,6 +48,7 @@ class BallParameters:
     size_tolerance: float = 1.6  # a tilt error of 1 deg changes the fitting radius at 6 m by a tenth
     size_slack: float = 1.5  # [px] blur and shading at the edge of a small ball
     least_fill: float = 0.45  # half hidden behind a foot or a post is still a ball
+    least_outline: float = 0.15  # half of it hidden by the own chest, and the other half nearly
     least_carpet: float = 0.25
     farthest: float = 10.0  # [m]
 
@@ -60,7 +65,7 @@ class BallParameters:
             raise ValueError(f"size_tolerance is {self.size_tolerance}; expected > 1")
         if self.size_slack < 0.0:
             raise ValueError(f"size_slack is {self.size_slack} px; expected >= 0 px")
-        for name in ("least_fill", "least_carpet"):
+        for name in ("least_fill", "least_outline", "least_carpet"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} is {getattr(self, name)}; expected 0 to 1")
 
@@ -89,9 +94,10 @@ def _examine(
     if segmentation.on_carpet[lowest[1], lowest[0]] == 0:
         return "not on the carpet"
     free = (points[:, 0] > 0) & (points[:, 0] < width - 1) & (points[:, 1] > 0) & (points[:, 1] < height - 1)
+    free &= ~_beside(segmentation.own_body, points)
     edge = points[free]
     if len(edge) < 5:
-        return "cut by the picture's edge"
+        return "hidden by the picture's edge or the own body"
     rays = view.directions_at(edge[:, 0], edge[:, 1])
     middle = rays.sum(axis=0)
     pixel = view.angle_per_pixel(middle / np.linalg.norm(middle))
@@ -99,8 +105,15 @@ def _examine(
     fit = _fit_cone(rays[hull], rays, pixel)
     if fit is None:
         return "no round outline"
+    if not free.all():
+        fit = _fit_resting(fit[0], rays, view, parameters.radius, pixel)
+        if fit is None:
+            return "what is seen of its outline is not that of a ball on the ground"
     centre, radius, residual, used = fit
     radius += 0.5 * pixel
+    seen = used / max(2.0 * math.pi * radius / pixel, 1.0)
+    if seen < parameters.least_outline:
+        return f"only {seen:.0%} of the outline is seen"
     if residual > max(1.2 * pixel, 0.12 * radius):
         return f"not round: edge off by {residual / pixel:.1f} px"
 
@@ -119,20 +132,21 @@ def _examine(
         return f"radius {radius / pixel:.0f} px, {fitting / pixel:.0f} px would fit the place"
 
     disk = math.pi * (radius / pixel) ** 2
-    fill = area / (disk if free.all() else disk * _visible_share(view, centre, radius))
+    fill = area / (disk if free.all() else disk * _visible_share(segmentation, view, centre, radius))
     if fill < parameters.least_fill:
         return f"only {fill:.0%} of the disk is orange"
     around = _cones(centre, [radius + max(0.35 * radius, 2.5 * pixel)], 24)
     around = around[around[:, 2] < centre[2] + 0.3 * radius]
-    classes, inside = view.sample(segmentation.classes, view.pixels_of_directions(around))
+    pixels = view.pixels_of_directions(around)
+    classes, inside = view.sample(segmentation.classes, pixels)
+    free_around = inside & (view.sample(segmentation.own_body, pixels)[0] == 0)
     carpet = belongs(classes, Colour.GREEN | Colour.WHITE)
-    share = float(carpet[inside].mean()) if inside.any() else 1.0  # the picture ends at the ball: nothing to see
+    share = float(carpet[free_around].mean()) if free_around.any() else 1.0  # nothing to see there
     if share < parameters.least_carpet:
         return f"only {share:.0%} carpet around it"
 
     azimuth, elevation = angles(centre[None])
     # A ball of which only part of the outline is seen is less sure in place: its fit extrapolates.
-    seen = used / max(2.0 * math.pi * radius / pixel, 1.0)
     doubt = 1.0 if seen > 0.7 else 1.0 + 3.0 * (0.7 - seen)
     spread_azimuth, spread_elevation = view.spreads(centre, doubt)
     fits = math.exp(-((math.log(radius / fitting) / math.log(parameters.size_tolerance)) ** 2))
@@ -180,6 +194,70 @@ def _fit_cone(start: Array, rays: Array, pixel: float) -> tuple[Array, float, fl
     return axis, radius, float(np.sqrt(np.mean(np.sort(residuals)[: max(len(kept), 1)] ** 2))), len(kept)
 
 
+def _fit_resting(
+    start: Array, rays: Array, view: View, ball_radius: float, pixel: float
+) -> tuple[Array, float, float, int] | None:
+    """Fit the cone of a ball that lies on the ground to part of its outline; arguments and answer as of `_fit_cone`.
+
+    Gauss-Newton over the two angles of the axis; half the opening angle follows from where the axis meets the height of
+    the ball's centre.
+    """
+    above = view.height - ball_radius
+    axis = start
+    for _ in range(5):
+        opening = _opening(axis, above, ball_radius)
+        if opening is None:
+            return None
+        right = np.array([axis[1], -axis[0], 0.0]) / math.hypot(axis[0], axis[1])
+        up = _cross(right, axis)
+        cosines = rays @ axis
+        away = np.arccos(np.clip(cosines, -1.0, 1.0))
+        # What the angles to the rays, and the opening, change by as the axis turns to the right and up
+        sines = np.maximum(np.sin(away), 1e-6)
+        changes = -np.column_stack((rays @ right, rays @ up)) / sines[:, None]
+        changes[:, 1] -= (_opening(axis + 1e-4 * up, above, ball_radius) or opening) / 1e-4 - opening / 1e-4
+        residuals = away - (opening - 0.5 * pixel)  # an outline runs through the middles of its pixels
+        weights = 1.0 / np.maximum(np.abs(residuals), pixel)  # as robust as the sum of distances
+        weighted = changes * weights[:, None]
+        try:
+            turn = np.linalg.solve(changes.T @ weighted, -weighted.T @ residuals)
+        except np.linalg.LinAlgError:
+            return None
+        axis = axis + turn[0] * right + turn[1] * up
+        axis = axis / np.linalg.norm(axis)
+        if abs(turn[0]) + abs(turn[1]) < 0.01 * pixel:
+            break
+    opening = _opening(axis, above, ball_radius)
+    if opening is None:
+        return None
+    opening -= 0.5 * pixel
+    residuals = np.abs(np.arccos(np.clip(rays @ axis, -1.0, 1.0)) - opening)
+    kept = np.sort(residuals)[: math.ceil(0.85 * len(residuals))]  # blur and shades spoil some of the ends
+    if float(np.sqrt(np.mean(kept**2))) > max(1.2 * pixel, 0.05 * opening):
+        return None
+    return axis, opening, float(np.sqrt(np.mean(kept**2))), len(residuals)
+
+
+def _opening(axis: Array, above: float, ball_radius: float) -> float | None:
+    """Return half the angle that a ball on the ground fills in a direction [rad], None where there is none."""
+    down = -float(axis[2]) / float(np.linalg.norm(axis))
+    if down <= 1e-3 or above <= 0.0 or above / down <= ball_radius:
+        return None
+    return math.asin(ball_radius * down / above)
+
+
+def _beside(own_body: Mask, points: NDArray[np.int32]) -> Mask:
+    """Return for each of (n, 2) pixels whether the own body is beside it."""
+    if not own_body.any():
+        return np.zeros(len(points), dtype=np.bool_)
+    height, width = own_body.shape
+    beside = np.zeros(len(points), dtype=np.bool_)
+    for du, dv in ((-BESIDE, 0), (BESIDE, 0), (0, -BESIDE), (0, BESIDE), (-2, -2), (-2, 2), (2, -2), (2, 2)):
+        u, v = np.clip(points[:, 0] + du, 0, width - 1), np.clip(points[:, 1] + dv, 0, height - 1)
+        beside |= own_body[v, u] != 0
+    return beside
+
+
 def _cones(axis: Array, openings: Sequence[float], count: int) -> Array:
     """Return `count` unit vectors, one after the other, at each of some angles [rad] around a unit vector (3,)."""
     helper = np.array([0.0, 0.0, 1.0]) if abs(axis[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
@@ -196,8 +274,8 @@ def _cross(first: Array, second: Array) -> Array:
     return np.array([b * z - c * y, c * x - a * z, a * y - b * x])
 
 
-def _visible_share(view: View, axis: Array, radius: float) -> float:
-    """Return how much of the ball's disk lies inside the picture, 0 to 1."""
+def _visible_share(segmentation: Segmentation, view: View, axis: Array, radius: float) -> float:
+    """Return how much of the ball's disk lies inside the picture and is not hidden by the own body, 0 to 1."""
     disk = _cones(axis, [radius * share for share in (0.25, 0.56, 0.75, 0.9)], 16)
-    inside = view.inside(view.pixels_of_directions(disk), margin=-0.5)
-    return max(float(inside.mean()), 0.05)
+    own, inside = view.sample(segmentation.own_body, view.pixels_of_directions(disk))
+    return max(float((inside & (own == 0)).mean()), 0.05)

@@ -30,7 +30,13 @@ def silhouette(view: View, centre: np.ndarray, radius: float) -> np.ndarray:
     return view.pixels_of_directions(cone)
 
 
-def look(view: View, *spheres: tuple[np.ndarray, float], cover: tuple[int, int, int, int] | None = None) -> Findings:
+def look(
+    view: View,
+    *spheres: tuple[np.ndarray, float],
+    cover: tuple[int, int, int, int] | None = None,
+    own_body_from: int = 480,
+) -> Findings:
+    """Return what is found; `cover` hides a rectangle, and the own body everything below a row."""
     picture = np.full((480, 640, 3), CARPET, np.uint8)
     for centre, radius in spheres:
         outline = np.rint(silhouette(view, centre, radius) * 16).astype(np.int32)
@@ -38,7 +44,10 @@ def look(view: View, *spheres: tuple[np.ndarray, float], cover: tuple[int, int, 
     if cover is not None:
         left, top, right, bottom = cover
         picture[top:bottom, left:right] = (50, 50, 50)
-    return find_ball(Segmenter(SegmentationParameters()).segment(picture, view), view, BallParameters())
+    own_body = np.zeros((480, 640), np.uint8)
+    own_body[own_body_from:] = 255
+    picture[own_body_from:] = (50, 50, 50)
+    return find_ball(Segmenter(SegmentationParameters()).segment(picture, view, own_body), view, BallParameters())
 
 
 @pytest.mark.parametrize("x", [0.5, 1.0, 2.5, 5.0, 8.0])
@@ -69,6 +78,31 @@ def test_ball_half_behind_a_foot_is_found_with_a_larger_spread() -> None:
     assert hidden.azimuth == pytest.approx(whole.azimuth, abs=math.radians(0.3))
     assert hidden.azimuth_spread > whole.azimuth_spread
     assert hidden.confidence < whole.confidence
+
+
+@pytest.mark.parametrize("shown", [0.25, 0.5, 0.8])
+@pytest.mark.parametrize("sideways", [0.0, 0.12])
+def test_ball_half_hidden_by_the_own_chest_is_found_where_it_lies(shown: float, sideways: float) -> None:
+    view = looking_down(head_camera_lens(), 1.2)
+    centre = np.array([0.4, sideways, RADIUS])
+    rows = silhouette(view, centre, RADIUS)[:, 1]
+    below = round(float(rows.min() + shown * np.ptp(rows)))
+    found = look(view, (centre, RADIUS), own_body_from=below).features
+    assert len(found) == 1
+    ray = centre - view.position
+    (azimuth,), (elevation,) = angles(ray[None] / np.linalg.norm(ray))
+    assert found[0].azimuth * math.cos(elevation) == pytest.approx(azimuth * math.cos(elevation), abs=0.003)
+    assert found[0].elevation == pytest.approx(elevation, abs=0.003)
+
+
+def test_what_the_own_chest_hides_half_must_be_as_big_as_a_ball_on_the_ground() -> None:
+    view = looking_down(head_camera_lens(), 1.2)
+    for radius in (0.05, 0.16):
+        centre = np.array([0.4, 0.0, radius])
+        rows = silhouette(view, centre, radius)[:, 1]
+        found = look(view, (centre, radius), own_body_from=round(float(rows.mean())))
+        assert not found.features
+        assert found.refusals
 
 
 @pytest.mark.parametrize(
