@@ -37,7 +37,7 @@ class TiltFilter:
         """
         self._period, self._learning_time, self._largest = period, learning_time, largest
         self._up: tuple[float, float] | None = None
-        self._rate = (0.0, 0.0, 0.0)
+        self._rate = [0.0, 0.0, 0.0]  # last angular velocity [rad/s]
         self._mounting = (0.0, 0.0)  # x and y of up, as the IMU has it, minus those of the soles
         self._readings = 0
 
@@ -61,18 +61,17 @@ class TiltFilter:
             x, y, z = flat  # turned into base_link:
             self._learn(felt_x - (xx * x + yx * y + zx * z), felt_y - (xy * x + yy * y + zy * z))
         felt_x, felt_y = felt_x - self._mounting[0], felt_y - self._mounting[1]
-        last, self._rate = self._rate, tuple(sensors.imu_angular_velocity.tolist())
+        rate_x, rate_y, rate_z = rate = sensors.imu_angular_velocity.tolist()
         if self._up is None:
-            self._up = (felt_x, felt_y)
+            self._up, self._rate = (felt_x, felt_y), rate
             return
-        up_x, up_y = self._up
+        (up_x, up_y), (last_x, last_y, last_z), self._rate = self._up, self._rate, rate
         up_z = math.sqrt(max(1.0 - up_x * up_x - up_y * up_y, 0.0))
-        rate_x, rate_y, rate_z = (0.5 * (before + now) for before, now in zip(last, self._rate, strict=True))
-        dt, share = self._period, self._period / AVERAGED
+        half, share = 0.5 * self._period, self._period / AVERAGED
+        turn_x, turn_y, turn_z = half * (last_x + rate_x), half * (last_y + rate_y), half * (last_z + rate_z)
         # What stands still in the world turns the other way as seen from the body.
-        up_x += dt * (rate_z * up_y - rate_y * up_z)
-        up_y += dt * (rate_x * up_z - rate_z * self._up[0])
-        self._up = (up_x + share * (felt_x - up_x), up_y + share * (felt_y - up_y))
+        now_x, now_y = up_x + turn_z * up_y - turn_y * up_z, up_y + turn_x * up_z - turn_z * up_x
+        self._up = (now_x + share * (felt_x - now_x), now_y + share * (felt_y - now_y))
 
     def corrected(self, rotation: Array) -> Array:
         """Return an attitude (3, 3) of base_link, turned about a level axis such that up is where the filter has it."""

@@ -246,7 +246,7 @@ def _opening(axis: Array, above: float, ball_radius: float) -> float | None:
     return math.asin(ball_radius * down / above)
 
 
-def _beside(own_body: Mask, points: NDArray[np.int32]) -> Mask:
+def _beside(own_body: Mask, points: NDArray[np.int32]) -> NDArray[np.bool_]:
     """Return for each of (n, 2) pixels whether the own body is beside it."""
     if not own_body.any():
         return np.zeros(len(points), dtype=np.bool_)
