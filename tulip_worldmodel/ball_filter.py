@@ -23,6 +23,10 @@ from tulip_worldmodel.sighting import Observer, Sighting, in_view
 
 Array = NDArray[np.float64]
 
+RESTLESS = (
+    2.5  # mean squared distance per dimension at which a ball seems moved: 1 if not, by chance 2.5 one time in 50
+)
+
 
 @dataclass(frozen=True)
 class BallParameters:
@@ -249,7 +253,7 @@ class BallFilter:
 
     def _velocity_noise(self) -> float:
         p = self._parameters
-        share = min(1.0, max(0.0, (self._restlessness - 1.5) / 1.5))
+        share = min(1.0, max(0.0, (self._restlessness - RESTLESS) / RESTLESS))
         return p.quiet_velocity_noise + share * (p.restless_velocity_noise - p.quiet_velocity_noise)
 
     def _rolling(self, point: MovingPoint, moved: Increment, observer_position: Array) -> PointMotion:

@@ -43,7 +43,7 @@ class OpponentParameters:
     confidence_gain: float = 0.3  # share of the missing confidence that a sighting adds
     confirmed: float = 0.6  # confidence of a confirmed opponent: reached with the third sighting
     forgotten: float = 0.05  # confidence at which it is given up
-    missed_time: float = 1.0  # [s] in which confidence falls by e while it should be visible but is not
+    missed_time: float = 0.6  # [s] in which confidence falls by e while it should be visible but is not
     hidden_time: float = 15.0  # [s] in which confidence falls by e while nobody looks
     visible_range: float = 5.0  # [m] up to which vision is expected to find it
     view_margin: float = math.radians(5.0)  # [rad] from the picture's edge, where it may be cut
