@@ -18,21 +18,19 @@ from tulip_worldmodel.mahalanobis import gate
 from tulip_worldmodel.moving_point import MovingPoint, PointEstimate, PointMotion, check_tracking, position_noise
 from tulip_worldmodel.odometry_history import Increment
 from tulip_worldmodel.rejected import Rejected
-from tulip_worldmodel.rolling import slowing
+from tulip_worldmodel.rolling import DECELERATION, slowing
 from tulip_worldmodel.sighting import Observer, Sighting, in_view
 
 Array = NDArray[np.float64]
 
-RESTLESS = (
-    2.5  # mean squared distance per dimension at which a ball seems moved: 1 if not, by chance 2.5 one time in 50
-)
+RESTLESS = 2.5  # mean squared distance per dimension from which a ball seems pushed; 1 for one that is not
 
 
 @dataclass(frozen=True)
 class BallParameters:
     """Parameters of the ball's filter. Noise grows with the root of what it is given for."""
 
-    rolling_deceleration: float = 0.3  # [m/s^2] carpet
+    rolling_deceleration: float = DECELERATION  # [m/s^2]
     position_noise_per_second: float = 0.02  # [m/sqrt(s)] slow errors of the camera's pose
     position_noise_per_metre: float = 0.10  # [m/sqrt(m)] dead reckoning of the walking robot
     position_noise_per_radian: float = 0.06  # [rad/sqrt(rad)] times range: dead reckoning of the turning robot

@@ -173,7 +173,8 @@ def _hidden(rows: Sequence[Row]) -> list[str]:
 
 def _opponents(rows: Sequence[Row]) -> list[str]:
     lines = [
-        "None to three opponents, without dynamics or pictures (the play of bench head), the head sweeping; NEES of four values, 4 if honest:",
+        "None to three opponents, without dynamics or pictures (the play of bench head), the head sweeping. NEES of"
+        " four values, 4 if honest:",
         "",
         "| opponents | robot | confirmed | after, median [s] | position RMSE [m] | velocity RMSE [m/s] | mean NEES |",
         "| --- | --- | --- | --- | --- | --- | --- |",

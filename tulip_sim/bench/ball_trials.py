@@ -12,13 +12,14 @@ from scipy.stats import chi2
 from tulip_description.field import load_field
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_sim.bench.ball_walk import BallWalk, Comparison, before_robot
+from tulip_sim.bench.localization import MOUNT_ANGLE, MOUNT_HEIGHT
 from tulip_sim.bench.runner import Row
+from tulip_sim.camera import CameraParameters
 from tulip_sim.keeper import Keeper
 from tulip_sim.lockstep import Settings
 from tulip_sim.perception import PerceptionParameters
 from tulip_sim.scenario import Scenario
-from tulip_worldmodel.ball_filter import BallParameters
-from tulip_worldmodel.rolling import rest
+from tulip_worldmodel.rolling import DECELERATION, rest
 from tulip_worldmodel.world_state import ObjectEstimate
 
 Array = NDArray[np.float64]
@@ -35,8 +36,10 @@ LOST = 0.5  # [m] an estimate of a hidden ball that errs by more has lost it
 BOUND = float(chi2.ppf(0.95, df=2))  # of the NEES of two values
 
 
-def settings_of(perception: str) -> Settings:
+def settings_of(perception: str, seed: int) -> Settings:
     """Return the parameters of all cores: "degraded" features from the truth, or "vision" with rendered pictures.
+
+    The camera sits as calibration leaves it, by the seed.
 
     Raises:
         ValueError: for another word.
@@ -44,14 +47,15 @@ def settings_of(perception: str) -> Settings:
     known = {"degraded": PerceptionParameters(), "vision": None}
     if perception not in known:
         raise ValueError(f"perception is {perception!r}; expected one of {', '.join(known)}")
-    return Settings(perception=known[perception])
+    camera = CameraParameters(mount_angle=MOUNT_ANGLE, mount_height=MOUNT_HEIGHT, mount_seed=seed)
+    return Settings(camera=camera, perception=known[perception])
 
 
 def standing(distance: float, walks: bool, seed: int, perception: str = "degraded") -> Row:
     """Watch a resting ball at a distance [m]."""
     rng = np.random.default_rng([seed, 21])
     robot, ball = _places(rng, distance)
-    trial = BallWalk(Scenario(robot, ball), seed, settings_of(perception), walks)
+    trial = BallWalk(Scenario(robot, ball), seed, settings_of(perception, seed), walks)
     looks = []
     try:
         trial.go(KNOWN)
@@ -82,7 +86,7 @@ def rolling(speed: float, walks: bool, seed: int, perception: str = "degraded") 
     comes = seed % 2 == 1
     robot, first, heading = _rolling_course(rng, speed)
     far_away = (robot.x - 12.0 * math.cos(robot.yaw), robot.y - 12.0 * math.sin(robot.yaw))
-    trial = BallWalk(Scenario(robot, far_away if comes else first), seed, settings_of(perception), walks)
+    trial = BallWalk(Scenario(robot, far_away if comes else first), seed, settings_of(perception, seed), walks)
     looks: list[tuple[float, Comparison]] = []
     try:
         trial.go(KNOWN)
@@ -105,7 +109,7 @@ def rolling(speed: float, walks: bool, seed: int, perception: str = "degraded") 
     # As sharp a question: where the ball will stop, asked half a second after it was kicked.
     stops = [
         math.dist(
-            rest(ball.position, ball.velocity, BallParameters().rolling_deceleration)[0],
+            rest(ball.position, ball.velocity, DECELERATION)[0],
             rest(each.position, each.velocity, trial.world.parameters.ball_rolling_deceleration)[0],
         )
         for each, ball in judged[:1]
@@ -138,16 +142,16 @@ def hidden(rolls: bool, walks: bool, seed: int, perception: str = "degraded") ->
     rng = np.random.default_rng([seed, 23])
     side = float(rng.choice((-1.0, 1.0)))
     robot = Pose2D(-2.0, float(rng.uniform(-0.5, 0.5)), float(rng.uniform(-0.2, 0.2)))
-    near, far = float(rng.uniform(1.6, 2.0)), float(rng.uniform(2.6, 3.2))
-    course, speed = robot.yaw - side * math.pi / 2.0, float(rng.uniform(1.4, 1.6))
+    near, far = float(rng.uniform(1.15, 1.25)), float(rng.uniform(2.7, 2.9))  # the trunk is in the way
+    course, speed = robot.yaw - side * math.pi / 2.0, float(rng.uniform(1.7, 1.9))
     if rolls:
         begin = before_robot(robot, math.hypot(far, 1.3), side * math.atan2(1.3, far))
         keeper = Keeper(robot @ Pose2D(near, 0.0, math.pi))
     else:
         begin = before_robot(robot, far, 0.0)
-        start, end = (robot.transform((near, way)) for way in (1.6 * side, -1.6 * side))
-        keeper = Keeper(Pose2D(*start, wrap_angle(robot.yaw + math.pi)), (end,), speed=0.4)
-    trial = BallWalk(Scenario(robot, begin, keeper), seed, settings_of(perception), walks, glances=rolls)
+        start, end = (robot.transform((near, way)) for way in (2.2 * side, -2.2 * side))
+        keeper = Keeper(Pose2D(*start, wrap_angle(robot.yaw + math.pi)), (end,), speed=0.6)
+    trial = BallWalk(Scenario(robot, begin, keeper), seed, settings_of(perception, seed), walks, glances=rolls)
     looks: list[Comparison] = []
     try:
         trial.go(KNOWN - 1.0)

@@ -72,7 +72,9 @@ class BallWalk(Lockstep):
         self._walks = walks
         self._look = track_ball if glances else look_at_ball
         self._gaze = StrategyGaze(settings.strategy, load_field())
-        self._judge = Perception(PerceptionParameters.ideal(), load_field(), load_robot(), head_camera_lens())
+        self._judge = Perception(
+            PerceptionParameters.ideal(), load_field(), load_robot(), head_camera_lens(), settings.camera
+        )
         self._truths: deque[Truth] = deque(maxlen=REMEMBERED)
         self.ball_visible = False
 
