@@ -19,10 +19,24 @@ from rich.markdown import Markdown
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
-from tulip_sim.bench import clik, control, head, ilc, kick, localization, odometry, push, stress, trial, vision, walk
+from tulip_sim.bench import (
+    ball,
+    clik,
+    control,
+    head,
+    ilc,
+    kick,
+    localization,
+    odometry,
+    push,
+    stress,
+    trial,
+    vision,
+    walk,
+)
 from tulip_sim.bench.runner import Row, run, save, write_results
 
-MODULES = (trial, walk, push, kick, odometry, control, ilc, clik, stress, vision, localization, head)
+MODULES = (trial, walk, push, kick, odometry, control, ilc, clik, stress, vision, localization, ball, head)
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"
 

@@ -60,6 +60,7 @@ class PerceptionParameters:
     blurred_speed: float = 4.0  # [rad/s] at which nothing is found any more
     false_landmarks: float = 0.1  # crossings and marks a picture that are none, on average
     false_balls: float = 0.001  # balls a picture that are none, on average
+    false_opponents: float = 0.002  # opponents a picture that are none, on average
     latency: float = 0.048  # [s] from the shutter to the features; never sooner than the camera pose, about 25 ms
     ball_range: float = 9.0  # [m] along the ground, as the others
     upright_range: float = 9.0  # [m] of posts and poles
@@ -98,6 +99,7 @@ class PerceptionParameters:
             blurred_speed=1e4,
             false_landmarks=0.0,
             false_balls=0.0,
+            false_opponents=0.0,
         )
 
 
@@ -209,7 +211,11 @@ class Perception:
         p = self._parameters
         view = View(self._lens, camera_in_footprint, self._spread)
         found = [self._feature(glimpse, view, rng) for glimpse in glimpses]
-        for kinds, rate in ((FALSE_KINDS, p.false_landmarks), ((FeatureClass.BALL,), p.false_balls)):
+        for kinds, rate in (
+            (FALSE_KINDS, p.false_landmarks),
+            ((FeatureClass.BALL,), p.false_balls),
+            ((FeatureClass.OPPONENT,), p.false_opponents),
+        ):
             for _ in range(int(rng.poisson(rate))):
                 found += self._false(kinds, view, rng)
         return Features(stamp, view.position, view.coverage(), tuple(found))

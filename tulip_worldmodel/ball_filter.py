@@ -13,31 +13,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_vision.features import Feature, FeatureClass, Features
-from tulip_vision.view import SpreadParameters
+from tulip_worldmodel.camera_error import CameraErrorParameters
 from tulip_worldmodel.mahalanobis import gate
 from tulip_worldmodel.moving_point import MovingPoint, PointEstimate, PointMotion, check_tracking, position_noise
 from tulip_worldmodel.odometry_history import Increment
 from tulip_worldmodel.rejected import Rejected
-from tulip_worldmodel.rolling import slowing
-from tulip_worldmodel.sighting import Observer, Sighting, in_view, lasting_spread
+from tulip_worldmodel.rolling import DECELERATION, slowing
+from tulip_worldmodel.sighting import Observer, Sighting, in_view
 
 Array = NDArray[np.float64]
+
+RESTLESS = 2.5  # mean squared distance per dimension from which a ball seems pushed; 1 for one that is not
 
 
 @dataclass(frozen=True)
 class BallParameters:
     """Parameters of the ball's filter. Noise grows with the root of what it is given for."""
 
-    rolling_deceleration: float = 0.3  # [m/s^2] carpet
+    rolling_deceleration: float = DECELERATION  # [m/s^2]
     position_noise_per_second: float = 0.02  # [m/sqrt(s)] slow errors of the camera's pose
     position_noise_per_metre: float = 0.10  # [m/sqrt(m)] dead reckoning of the walking robot
     position_noise_per_radian: float = 0.06  # [rad/sqrt(rad)] times range: dead reckoning of the turning robot
     quiet_velocity_noise: float = 0.1  # [m/s/sqrt(s)] while sightings agree with the filter
     restless_velocity_noise: float = 1.5  # [m/s/sqrt(s)] while they do not: dribbled, pushed
     restless_time: float = 0.2  # [s] over which the agreement is averaged: three pictures
-    pose_azimuth_spread: float = SpreadParameters.pose_azimuth  # [rad] heading of the camera's pose: vision's number
-    pose_elevation_spread: float = SpreadParameters.pose_elevation  # [rad] its tilt: vision's number
-    pose_error_time: float = 0.5  # [s] how long such an error lasts: about a step
     angular_radius_range: float = 3.0  # [m] beyond it the ball's size tells its range better than its elevation
     angular_radius_spread: float = 0.0015  # [rad] a pixel
     start_speed_spread: float = 0.5  # [m/s] of a ball seen for the first time
@@ -65,14 +64,18 @@ class BallParameters:
 class BallFilter:
     """The one ball of the game."""
 
-    def __init__(self, parameters: BallParameters, ball_radius: float) -> None:
+    def __init__(
+        self, parameters: BallParameters, ball_radius: float, camera: CameraErrorParameters | None = None
+    ) -> None:
         """Begin without a ball.
 
         Args:
             parameters: See `BallParameters`.
             ball_radius: [m].
+            camera: How far its pose may be off; by default as vision says.
         """
         self._parameters = parameters
+        self._camera = camera or CameraErrorParameters()
         self._radius = ball_radius
         self._point: MovingPoint | None = None
         self._unexplained: Sighting | None = None
@@ -129,14 +132,10 @@ class BallFilter:
         p = self._parameters
         rejected: list[Rejected] = []
         sightings: list[Sighting] = []
-        lasting = (
-            lasting_spread(p.pose_azimuth_spread, p.pose_error_time, since_last),
-            lasting_spread(p.pose_elevation_spread, p.pose_error_time, since_last),
-        )
         for feature in features.features:
             if feature.kind is not FeatureClass.BALL:
                 continue
-            sighting = Sighting(feature, observer, self._radius, lasting)
+            sighting = Sighting(feature, observer, self._radius, self._camera)
             if not sighting.has_range or self._range(sighting) > p.longest_range:
                 rejected.append(Rejected(features.stamp, "a ball at or above the horizon, or off the field", feature))
             else:
@@ -161,8 +160,7 @@ class BallFilter:
         return tuple(rejected)
 
     def _range(self, sighting: Sighting) -> float:
-        position, _ = sighting.position()
-        return math.dist(position, (sighting.observer.pose.x, sighting.observer.pose.y))
+        return math.dist(sighting.place().position, (sighting.observer.pose.x, sighting.observer.pose.y))
 
     def _see(self, sighting: Sighting, since_last: float) -> None:
         p, point = self._parameters, self.point
@@ -181,10 +179,11 @@ class BallFilter:
             return
         expected = math.asin(self._radius / distance)
         by_distance = -self._radius / (distance * math.sqrt(distance**2 - self._radius**2))
-        jacobian = by_distance * (observer.pose.rotation() @ (offset[:2] / distance))[None, :]
+        jacobian = np.zeros((1, 5))  # a turned camera sees it as large
+        jacobian[0, :2] = by_distance * (observer.pose.rotation() @ (offset[:2] / distance))
         innovation = np.array([feature.angular_radius - expected])
         noise = np.array([[p.angular_radius_spread**2]])
-        spread = float((jacobian @ point.covariance[:2, :2] @ jacobian.T + noise)[0, 0])
+        spread = float((jacobian[:, :2] @ point.covariance[:2, :2] @ jacobian[:, :2].T + noise)[0, 0])
         if innovation[0] ** 2 / spread <= gate(p.gate_probability, 1):  # a ball half hidden looks small
             point.correct(innovation, jacobian, noise)
 
@@ -201,9 +200,9 @@ class BallFilter:
     def _start(self, sighting: Sighting, sightings: list[Sighting]) -> list[Rejected]:
         """Begin a ball, or begin it anew after a second unexplained sighting."""
         p = self._parameters
-        position, covariance = sighting.position()
+        place = sighting.place()
         if self._point is None:
-            self._point = MovingPoint(position, covariance, np.zeros(2), np.eye(2) * p.start_speed_spread**2)
+            self._point = MovingPoint(place, np.zeros(2), np.eye(2) * p.start_speed_spread**2, self._camera)
             self.confidence = 0.0
             self._restlessness = 1.0
             self._gain_confidence(sighting)
@@ -221,18 +220,19 @@ class BallFilter:
         if first is None:
             return [here, *rest]
         duration = (sighting.observer.stamp - first.observer.stamp) * 1e-9
-        first_position, first_covariance = first.position()
+        before = first.place()
         if not 0.0 < duration <= p.restart_time:
             return [here, *rest]
-        velocity = (position - first_position) / duration
-        velocity_covariance = (covariance + first_covariance) / duration**2
+        velocity = (place.position - before.position) / duration
+        _, anew = self._camera.fading(duration)  # what both sightings have in common moves neither
+        velocity_covariance = (before.own + place.covariance(anew)) / duration**2
         spread = math.sqrt(float(np.trace(velocity_covariance)))
         if np.linalg.norm(velocity) > p.greatest_speed + 2.0 * spread:
             return [here, *rest]
         # Weighed with what balls do (they stand or roll at most at a few m/s), far sightings give no wild speeds.
         prior = (p.greatest_speed / 2.0) ** 2 * np.eye(2)
         gain = prior @ np.linalg.inv(prior + velocity_covariance)
-        self._point = MovingPoint(position, covariance, gain @ velocity, (np.eye(2) - gain) @ prior)
+        self._point = MovingPoint(place, gain @ velocity, (np.eye(2) - gain) @ prior, self._camera)
         self._restlessness = 1.0
         self._unexplained = None
         self._gain_confidence(sighting)
@@ -251,7 +251,7 @@ class BallFilter:
 
     def _velocity_noise(self) -> float:
         p = self._parameters
-        share = min(1.0, max(0.0, (self._restlessness - 1.5) / 1.5))
+        share = min(1.0, max(0.0, (self._restlessness - RESTLESS) / RESTLESS))
         return p.quiet_velocity_noise + share * (p.restless_velocity_noise - p.quiet_velocity_noise)
 
     def _rolling(self, point: MovingPoint, moved: Increment, observer_position: Array) -> PointMotion:

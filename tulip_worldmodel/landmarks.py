@@ -1,8 +1,8 @@
 """What the robot should see of the field from a pose, and how that changes with the pose.
 
 State of localization, (7,): x, y [m], yaw [rad] of base_footprint in map; the small rotation w about the x, y and
-z axes of base_footprint [rad] by which the camera's pose errs from what kinematics and IMU say; and the heading
-drift [rad/s] that dead reckoning misses. An observed ray is the true offset o turned by w: o' = o + w x o.
+z axes of base_footprint [rad] by which the camera's pose errs (camera_error.py); and the heading drift [rad/s] that
+dead reckoning misses.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tulip_description.field import CrossingKind, Field, LineSegment
 from tulip_vision.features import Feature, FeatureClass
+from tulip_worldmodel.camera_error import by_turn, turned
 from tulip_worldmodel.direction import directions, meet_plane, rays, wrap
 
 Array = NDArray[np.float64]
@@ -120,9 +121,9 @@ def point_directions(state: Array, points: Array, camera_position: Array) -> tup
     by_state[:, :2, :2] = -to_footprint
     by_state[:, 0, 2] = relative[:, 1]
     by_state[:, 1, 2] = -relative[:, 0]
-    turn = _turned(state[ERROR])
+    turn = turned(state[ERROR])
     by_state = turn @ by_state
-    by_state[:, :, ERROR] = _by_turn(offset)
+    by_state[:, :, ERROR] = by_turn(offset)
     angles, by_offset = directions(offset @ turn.T)
     return angles, by_offset @ by_state
 
@@ -157,7 +158,7 @@ class LinePiece:
         """
         self._camera_position = camera_position
         self._rays, self._rays_by_angles = rays(ends)
-        self._rays_by_error = -_by_turn(self._rays)
+        self._rays_by_error = -by_turn(self._rays)
 
     def ground_ends(self) -> Array:
         """Return (2, 2) both ends on the ground in base_footprint [m], as the camera's pose has it."""
@@ -165,13 +166,13 @@ class LinePiece:
 
     def along(self, state: Array, lines: Lines) -> Array:
         """Return where both ends lie along lines, (n, 2) from their starts [m]."""
-        points = meet_plane(self._rays @ _turned(-state[ERROR]).T, self._camera_position)[0]
+        points = meet_plane(self._rays @ turned(-state[ERROR]).T, self._camera_position)[0]
         in_map = points @ _rotation(state[2]).T + state[:2]
         return np.asarray(lines.along @ in_map.T - lines.starts[:, :1])
 
     def misfits(self, state: Array, lines: Lines) -> LineMisfits:
         """Return how the piece lies relative to lines, seen from a state (7,)."""
-        back = _turned(-state[ERROR])
+        back = turned(-state[ERROR])
         points, points_by_rays = meet_plane(self._rays @ back.T, self._camera_position)
         points_by_error = points_by_rays @ self._rays_by_error
         points_by_angles = points_by_rays @ (back @ self._rays_by_angles)
@@ -198,22 +199,6 @@ class LinePiece:
         by_angles[:, 1, :2] = across @ (0.5 * points_by_angles[0])
         by_angles[:, 1, 2:] = across @ (0.5 * points_by_angles[1])
         return LineMisfits(misfits, by_state, by_angles, lines.along @ in_map.T - lines.starts[:, :1])
-
-
-def _turned(rotation: Array) -> Array:
-    """Return (3, 3) that turns by a small rotation vector (3,): v + w x v."""
-    roll, pitch, turn = rotation.tolist()
-    return np.array([[1.0, -turn, pitch], [turn, 1.0, -roll], [-pitch, roll, 1.0]])
-
-
-def _by_turn(vectors: Array) -> Array:
-    """Return (n, 3, 3) the derivative of w x v by w, for (n, 3) vectors v."""
-    jacobian = np.zeros((len(vectors), 3, 3))
-    x, y, z = vectors.T
-    jacobian[:, 0, 1], jacobian[:, 0, 2] = z, -y
-    jacobian[:, 1, 0], jacobian[:, 1, 2] = -z, x
-    jacobian[:, 2, 0], jacobian[:, 2, 1] = y, -x
-    return jacobian
 
 
 def _rotation(yaw: float) -> Array:

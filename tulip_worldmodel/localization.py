@@ -14,7 +14,7 @@ little are dropped, and the first that outweighs all others for long enough is b
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from tulip_description.field import Field
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_vision.features import Feature, FeatureClass, Features
+from tulip_worldmodel.camera_error import CameraErrorParameters, own_spread
 from tulip_worldmodel.direction import HORIZON
 from tulip_worldmodel.landmark_association import Observation
 from tulip_worldmodel.landmarks import CROSSINGS, LineObservation, PointObservation, landmarks_of
@@ -36,7 +37,6 @@ from tulip_worldmodel.side import SideJudge, is_pole
 Array = NDArray[np.float64]
 
 LEAST_WEIGHT = 1e-4  # a hypothesis below it is dropped
-LEAST_SPREAD = math.radians(0.03)  # [rad] of a feature's own direction: a third of a pixel
 TRUST_TIME = 10.0  # [s] in which the heading kept for the case of being lost follows the filter's
 
 
@@ -55,7 +55,13 @@ class _Hypothesis:
 class Localization:
     """Pose of base_footprint in map, with its covariance."""
 
-    def __init__(self, parameters: LocalizationParameters, field: Field, start: Pose2D) -> None:
+    def __init__(
+        self,
+        parameters: LocalizationParameters,
+        field: Field,
+        start: Pose2D,
+        camera: CameraErrorParameters | None = None,
+    ) -> None:
         """Begin at a known place.
 
         Args:
@@ -63,14 +69,16 @@ class Localization:
             field: The field to be found again.
             start: base_footprint in map, as good as `start_position_spread` and `start_heading_spread` say. Its heading
                 tells which of the two equal halves is which.
+            camera: How far its pose may be off; by default as vision says.
         """
         p = self._parameters = parameters
+        self._camera = camera or CameraErrorParameters()
         self._landmarks = landmarks_of(field)
         self._seeds = SeedFinder(parameters, field)
         self._side = SideJudge(parameters, self._landmarks, self._seeds)
         self._scale = NoiseScale(p)
         spreads = (p.start_position_spread, p.start_position_spread, p.start_heading_spread)
-        self._hypotheses = [_Hypothesis(PoseFilter(parameters, start, spreads), 0.0)]
+        self._hypotheses = [_Hypothesis(PoseFilter(p, self._camera, start, spreads), 0.0)]
         self._heading = start.yaw  # [rad] by dead reckoning, drawn slowly to what was believed while all was well
 
     @property
@@ -170,7 +178,7 @@ class Localization:
             each.log_weight += math.log(1.0 - p.seed_share)
         for seed in seeds:
             log_weight = math.log(p.seed_share) + seed.log_weight - norm
-            sown = _Hypothesis(PoseFilter(p, seed.pose, spreads), log_weight)
+            sown = _Hypothesis(PoseFilter(p, self._camera, seed.pose, spreads), log_weight)
             twin = next((each for each in known if close(seed.pose, each.filter.pose)), None)
             if twin is None:
                 self._hypotheses.append(sown)
@@ -213,7 +221,7 @@ class Localization:
 
     def _observation(self, feature: Feature, camera_position: Array) -> tuple[Observation | None, str]:
         p = self._parameters
-        feature = own_spread(feature, p, self._scale.value)
+        feature = own_spread(feature, self._camera, self._scale.value)
         lowest = -math.atan2(float(camera_position[2]), p.longest_range)
         if feature.kind is FeatureClass.LINE:
             if not (feature.elevation < HORIZON and feature.end_elevation < HORIZON):
@@ -230,24 +238,3 @@ class Localization:
         if math.isnan(feature.elevation) and feature.kind in CROSSINGS:
             return None, "a crossing without elevation"
         return PointObservation(feature, self._landmarks.points[feature.kind], camera_position, p.landmark_spread), ""
-
-
-def own_spread(feature: Feature, parameters: LocalizationParameters, scale: float) -> Feature:
-    """Return a feature with the spread that it does not share with all others of its picture.
-
-    The camera pose's share, as vision puts it in (`View.spreads`), is in the state. A roll about the line of sight
-    moves the azimuth of what lies below the horizon.
-
-    Args:
-        feature: As vision gives it.
-        parameters: Of which the spreads of the camera's pose count.
-        scale: How many times worse vision is than it says (noise_scale.py).
-    """
-    p = parameters
-    azimuth = feature.azimuth_spread**2 - p.pose_azimuth_spread**2
-    elevation = feature.elevation_spread**2
-    if not math.isnan(feature.elevation):
-        azimuth -= (p.pose_elevation_spread * math.tan(feature.elevation)) ** 2
-        elevation = max(elevation - p.pose_elevation_spread**2, LEAST_SPREAD**2)
-    azimuth = max(azimuth, LEAST_SPREAD**2)
-    return replace(feature, azimuth_spread=scale * math.sqrt(azimuth), elevation_spread=scale * math.sqrt(elevation))

@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-from tulip_vision.view import SpreadParameters
-
 
 @dataclass(frozen=True)
 class LocalizationParameters:
     """Parameters of localization. Noise of dead reckoning grows with the root of what it is given for.
 
-    What odometry says of its own uncertainty (slips, hops, falls) is added to the position noise given here. How far
-    the camera's pose may be off is stated once, in vision's `SpreadParameters`: vision puts it into the spreads of its
-    features, as each of them errs by it, and localization takes it out again, as all features of a picture share it.
+    What odometry says of its own uncertainty (slips, hops, falls) is added to the position noise given here.
     """
 
     start_position_spread: float = 0.3  # [m] a person puts the robot down by eye
@@ -27,9 +23,6 @@ class LocalizationParameters:
     heading_noise_per_second: float = math.radians(0.04)  # [rad/sqrt(s)] noise of the IMU's heading
     drift_spread: float = 0.0005  # [rad/s] of the heading: bias of the IMU, twice that of a good one
     drift_time: float = 60.0  # [s] how long a drift lasts
-    pose_azimuth_spread: float = SpreadParameters.pose_azimuth  # [rad] heading of the camera's pose: vision's number
-    pose_elevation_spread: float = SpreadParameters.pose_elevation  # [rad] its roll and pitch: vision's number
-    pose_error_time: float = 0.5  # [s] how long such an error lasts: about a step
     noise_scale_rate: float = 0.01  # by which a feature changes the factor on vision's spreads: 4 s to the threefold
     greatest_noise_scale: float = 4.0  # vision is not taken to be worse than so many times what it says
     landmark_spread: float = 0.01  # [m] which edge of a line or post is seen; 0.03 on a field painted by hand

@@ -1,6 +1,7 @@
 """An extended Kalman filter for a point that moves on the ground, seen under two angles.
 
-State: position [m] and velocity [m/s] in odom, (4,).
+State, (7,): position [m] and velocity [m/s] in odom, and the error of the camera's pose [rad] (camera_error.py).
+With it, successive pictures tell precisely how the point moves, and still not where it is.
 """
 
 from __future__ import annotations
@@ -13,11 +14,15 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
+from tulip_worldmodel.camera_error import CameraErrorParameters
 from tulip_worldmodel.mahalanobis import distances_and_determinants
 from tulip_worldmodel.rolling import Slowing
-from tulip_worldmodel.sighting import Sighting
+from tulip_worldmodel.sighting import Place, Sighting
 
 Array = NDArray[np.float64]
+
+STATES = 7
+SEEN = np.ix_((0, 1, 4, 5, 6), (0, 1, 4, 5, 6))  # what an angle depends on
 
 
 def check_tracking(parameters: Any) -> None:
@@ -72,53 +77,75 @@ class MovingPoint:
     """Position and velocity of one object in odom."""
 
     def __init__(
-        self, position: Array, position_covariance: Array, velocity: Array, velocity_covariance: Array
+        self,
+        place: Place,
+        velocity: Array,
+        velocity_covariance: Array,
+        camera: CameraErrorParameters,
     ) -> None:
-        """Begin with (2,) position [m] and velocity [m/s] and their (2, 2) covariances."""
-        self._filter = ExtendedKalmanFilter(dim_x=4, dim_z=2)
-        self._filter.x = np.concatenate((position, velocity))
-        self._filter.P = np.zeros((4, 4))
-        self._filter.P[:2, :2] = position_covariance
-        self._filter.P[2:, 2:] = velocity_covariance
+        """Begin.
+
+        Args:
+            place: By a first sighting.
+            velocity: (2,) [m/s].
+            velocity_covariance: (2, 2).
+            camera: How far its pose may be off.
+        """
+        self._camera = camera
+        self._filter = ExtendedKalmanFilter(dim_x=STATES, dim_z=2)
+        self._filter.x = np.concatenate((place.position, velocity, np.zeros(3)))
+        self._filter.P = np.zeros((STATES, STATES))
+        self._filter.P[:2, :2] = place.covariance(camera.variances)
+        self._filter.P[2:4, 2:4] = velocity_covariance
+        self._filter.P[4:, 4:] = np.diag(camera.variances)
+        self._filter.P[:2, 4:] = place.by_error * camera.variances
+        self._filter.P[4:, :2] = self._filter.P[:2, 4:].T
 
     @property
     def state(self) -> Array:
         """(4,) position [m] and velocity [m/s] in odom."""
-        return np.array(self._filter.x)
+        return np.array(self._filter.x[:4])
 
     @property
     def covariance(self) -> Array:
-        """(4, 4) of the state."""
-        return np.array(self._filter.P)
+        """(4, 4) of position and velocity."""
+        return np.array(self._filter.P[:4, :4])
 
     def predict(self, motion: PointMotion) -> None:
         """Move on."""
-        estimate = self.predicted(motion)
-        self._filter.x, self._filter.P = estimate.state, estimate.covariance
+        self._filter.x, self._filter.P = self._moved(motion)
 
     def predicted(self, motion: PointMotion) -> PointEstimate:
         """Return what `predict` leads to, without changing the filter."""
-        transition, offset, noise = _transition(motion)
+        state, covariance = self._moved(motion)
+        return PointEstimate(state[:4], covariance[:4, :4])
+
+    def _moved(self, motion: PointMotion) -> tuple[Array, Array]:
+        left, anew = self._camera.fading(motion.duration)
+        transition, noise = left * np.eye(STATES), np.diag([*np.zeros(4), *anew])
+        transition[:4, :4], offset, noise[:4, :4] = _transition(motion)
+        state = transition @ self._filter.x
+        state[:4] += offset
         covariance = transition @ self._filter.P @ transition.T + noise
-        return PointEstimate(transition @ self._filter.x + offset, (covariance + covariance.T) / 2.0)
+        return state, (covariance + covariance.T) / 2.0
 
     def distance(self, sighting: Sighting) -> float:
         """Return the squared Mahalanobis distance of a sighting."""
-        innovation, jacobian = sighting.innovation(self._filter.x[:2])
-        spread = jacobian @ self._filter.P[:2, :2] @ jacobian.T + sighting.noise
+        innovation, jacobian = sighting.innovation(self._filter.x[:2], self._filter.x[4:])
+        spread = jacobian @ self._filter.P[SEEN] @ jacobian.T + sighting.noise
         return float(distances_and_determinants(innovation[None], spread[None])[0][0])
 
     def correct(self, innovation: Array, jacobian: Array, noise: Array) -> None:
-        """Apply a measurement of the position: (m,) innovation, (m, 2) Jacobian, (m, m) noise."""
-        whole = np.zeros((len(innovation), 4))
-        whole[:, :2] = jacobian
+        """Apply a measurement: (m,) innovation, (m, 5) Jacobian by position and camera error, (m, m) noise."""
+        whole = np.zeros((len(innovation), STATES))
+        whole[:, (0, 1, 4, 5, 6)] = jacobian
         # The innovation comes with its angles wrapped: the measurement is 0 and its prediction minus that.
         self._filter.update(np.zeros(len(innovation)), HJacobian=lambda _: whole, Hx=lambda _: -innovation, R=noise)
         self._tidy()
 
     def see(self, sighting: Sighting) -> None:
         """Apply a sighting."""
-        self.correct(*sighting.innovation(self._filter.x[:2]), sighting.noise)
+        self.correct(*sighting.innovation(self._filter.x[:2], self._filter.x[4:]), sighting.noise)
 
     def _tidy(self) -> None:
         self._filter.P = (self._filter.P + self._filter.P.T) / 2.0

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tulip_description.planar import wrap_angle
 from tulip_vision.features import FeatureClass, Features
 from tulip_worldmodel.association import assign
+from tulip_worldmodel.camera_error import CameraErrorParameters
 from tulip_worldmodel.mahalanobis import gate
 from tulip_worldmodel.moving_point import MovingPoint, PointEstimate, PointMotion, check_tracking, position_noise
 from tulip_worldmodel.odometry_history import Increment
@@ -42,7 +43,7 @@ class OpponentParameters:
     confidence_gain: float = 0.3  # share of the missing confidence that a sighting adds
     confirmed: float = 0.6  # confidence of a confirmed opponent: reached with the third sighting
     forgotten: float = 0.05  # confidence at which it is given up
-    missed_time: float = 1.0  # [s] in which confidence falls by e while it should be visible but is not
+    missed_time: float = 0.6  # [s] in which confidence falls by e while it should be visible but is not
     hidden_time: float = 15.0  # [s] in which confidence falls by e while nobody looks
     visible_range: float = 5.0  # [m] up to which vision is expected to find it
     view_margin: float = math.radians(5.0)  # [rad] from the picture's edge, where it may be cut
@@ -59,10 +60,10 @@ class OpponentParameters:
 class Opponent:
     """One opponent, perhaps not yet confirmed."""
 
-    def __init__(self, parameters: OpponentParameters, sighting: Sighting) -> None:
+    def __init__(self, parameters: OpponentParameters, camera: CameraErrorParameters, sighting: Sighting) -> None:
         """Begin where a sighting with range shows it."""
-        position, covariance = sighting.position()
-        self.point = MovingPoint(position, covariance, np.zeros(2), np.eye(2) * parameters.start_speed_spread**2)
+        speed = np.eye(2) * parameters.start_speed_spread**2
+        self.point = MovingPoint(sighting.place(), np.zeros(2), speed, camera)
         self._parameters = parameters
         self.confirmed = False
         self.confidence = 0.0
@@ -98,9 +99,10 @@ class Opponent:
 class OpponentFilter:
     """All opponents."""
 
-    def __init__(self, parameters: OpponentParameters) -> None:
-        """Begin without opponents."""
+    def __init__(self, parameters: OpponentParameters, camera: CameraErrorParameters | None = None) -> None:
+        """Begin without opponents; the camera's pose may be off as far as vision says, if not told otherwise."""
         self._parameters = parameters
+        self._camera = camera or CameraErrorParameters()
         self._opponents: list[Opponent] = []
 
     @property
@@ -126,7 +128,7 @@ class OpponentFilter:
         """
         p = self._parameters
         sightings = [
-            Sighting(feature, observer, GROUND, (p.body_azimuth_spread, p.body_elevation_spread))
+            Sighting(feature, observer, GROUND, self._camera, (p.body_azimuth_spread, p.body_elevation_spread))
             for feature in features.features
             if feature.kind is FeatureClass.OPPONENT
         ]
@@ -177,12 +179,11 @@ class OpponentFilter:
         p = self._parameters
         if not sighting.has_range:
             return "an unknown opponent without range"
-        position, _ = sighting.position()
-        if math.dist(position, (sighting.observer.pose.x, sighting.observer.pose.y)) > p.longest_range:
+        if math.dist(sighting.place().position, (sighting.observer.pose.x, sighting.observer.pose.y)) > p.longest_range:
             return "an unknown opponent too far away"
         if len(self._opponents) >= p.most:
             return "more opponents than can be on the field"
-        self._opponents.append(Opponent(p, sighting))
+        self._opponents.append(Opponent(p, self._camera, sighting))
         return ""
 
     def _merge(self) -> None:

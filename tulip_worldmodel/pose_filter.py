@@ -1,9 +1,8 @@
 """One hypothesis of where the robot is: an extended Kalman filter over dead reckoning and landmarks.
 
 State: x, y [m], yaw [rad] of base_footprint in map, the error of the camera's pose as a small rotation [rad], and the
-drift of the heading [rad/s] (see landmarks.py). The camera's error dies out with a time constant; it carries what all
-features of a picture, and of the next ones, have in common: a swaying trunk misjudged by half a degree moves every far
-feature by decimetres in the same direction. The drift is the bias of the IMU.
+drift of the heading [rad/s] (see landmarks.py). A swaying trunk misjudged by half a degree moves every far feature by
+decimetres in the same direction: the camera's error carries that (camera_error.py). The drift is the bias of the IMU.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_vision.features import Feature, FeatureClass
+from tulip_worldmodel.camera_error import CameraErrorParameters
 from tulip_worldmodel.landmark_association import Observation, associate
 from tulip_worldmodel.landmarks import CROSSINGS, ERROR, STATES
 from tulip_worldmodel.localization_parameters import LocalizationParameters
@@ -50,11 +50,18 @@ class Outcome:
 class PoseFilter:
     """Pose of base_footprint in map, with its covariance."""
 
-    def __init__(self, parameters: LocalizationParameters, pose: Pose2D, spreads: tuple[float, float, float]) -> None:
+    def __init__(
+        self,
+        parameters: LocalizationParameters,
+        camera: CameraErrorParameters,
+        pose: Pose2D,
+        spreads: tuple[float, float, float],
+    ) -> None:
         """Begin at a place.
 
         Args:
             parameters: See `LocalizationParameters`.
+            camera: How far its pose may be off.
             pose: base_footprint in map.
             spreads: Its standard deviations in x, y [m], yaw [rad].
         """
@@ -65,10 +72,10 @@ class PoseFilter:
         self.side = 0.0
         """Nats by which poles speak for this side of the field and against the other (side.py)."""
         self._unexplained_time = 0.0  # [s] with features of which none could be used
-        self._camera_variances = np.square([p.pose_elevation_spread, p.pose_elevation_spread, p.pose_azimuth_spread])
+        self._camera = camera
         self._filter = ExtendedKalmanFilter(dim_x=STATES, dim_z=2)
         self._filter.x = np.array([pose.x, pose.y, pose.yaw, 0.0, 0.0, 0.0, 0.0])
-        self._filter.P = np.diag([*np.square(spreads), *self._camera_variances, p.drift_spread**2])
+        self._filter.P = np.diag([*np.square(spreads), *camera.variances, p.drift_spread**2])
         self._filter.B = np.eye(STATES)
 
     @property
@@ -155,7 +162,7 @@ class PoseFilter:
         x, y, yaw, roll, pitch, turn, drift = self._filter.x.tolist()
         c, s = math.cos(yaw), math.sin(yaw)
         step_x, step_y = c * moved.pose.x - s * moved.pose.y, s * moved.pose.x + c * moved.pose.y
-        fade = math.exp(-moved.duration / p.pose_error_time)
+        fade, anew = self._camera.fading(moved.duration)
         keep = math.exp(-moved.duration / p.drift_time)
         turned = yaw + moved.pose.yaw + drift * moved.duration
         error = (roll * fade, pitch * fade, turn * fade)
@@ -176,9 +183,8 @@ class PoseFilter:
         if self._unexplained_time > p.lost_time or self.detector.lost:
             position += p.lost_position_noise**2 * moved.duration
             heading += p.lost_heading_noise**2 * moved.duration
-        camera = self._camera_variances * scale**2 * (1.0 - fade**2)
         wander = p.drift_spread**2 * (1.0 - keep**2)
-        noise = np.diag([position, position, heading, *camera, wander])
+        noise = np.diag([position, position, heading, *(scale**2 * anew), wander])
         if moved.slip is not None:
             to_map = np.array([[c, -s], [s, c]])
             noise[:2, :2] += to_map @ moved.slip @ to_map.T

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+DECELERATION = 0.35  # [m/s^2] of a ball on carpet; let one roll 2 m and stop the time to measure it
 LEAST_VARIANCE = 1e-12  # [m^2/s^2] keeps the inverse of a velocity's covariance finite
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_vision.features import Feature, Features
+from tulip_worldmodel.camera_error import CameraErrorParameters, by_turn, own_spread, turned
 from tulip_worldmodel.direction import HORIZON, directions, meet_plane, rays, wrap
 
 Array = NDArray[np.float64]
@@ -37,15 +38,66 @@ class Observer:
 
     def direction(self, position: Array, height: float) -> tuple[Array, Array]:
         """Return the (2,) angles of a point (2,) of odom at a height, and their (2, 2) derivatives by the point."""
-        angles, jacobian = directions(self.offset(position, height))
-        return angles[0], jacobian[0, :, :2] @ self.pose.rotation().T
+        angles, jacobian = self.seen(position, height, np.zeros(3))
+        return angles, jacobian[:, :2]
+
+    def seen(self, position: Array, height: float, error: Array) -> tuple[Array, Array]:
+        """Return under which angles a camera whose pose errs sees a point.
+
+        Args:
+            position: (2,) of odom [m].
+            height: Above the ground [m].
+            error: (3,) of the camera's pose (camera_error.py) [rad].
+
+        Returns:
+            (2,) azimuth and elevation, and their (2, 5) derivatives by position and error.
+        """
+        offset = self.offset(position, height)
+        turn = turned(error)
+        angles, by_offset = directions(offset @ turn.T)
+        jacobian = np.empty((2, 5))
+        jacobian[:, :2] = (by_offset[0] @ turn)[:, :2] @ self.pose.rotation().T
+        jacobian[:, 2:] = by_offset[0] @ by_turn(offset)[0]
+        return angles[0], jacobian
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an object is by one sighting alone, in odom.
+
+    Attributes:
+        position: (2,) [m].
+        own: (2, 2) covariance from the feature's own noise [m^2].
+        by_error: (2, 3) how it changes with the error of the camera's pose [m/rad].
+    """
+
+    position: Array
+    own: Array
+    by_error: Array
+
+    def covariance(self, camera_variances: Array) -> Array:
+        """Return the (2, 2) covariance [m^2], given the (3,) variances of the camera pose's error [rad^2]."""
+        return np.asarray(self.own + (self.by_error * camera_variances) @ self.by_error.T)
 
 
 class Sighting:
-    """One feature of a movable object, with the noise that the filter shall believe."""
+    """One feature of a movable object, with the noise that the filter shall believe.
+
+    Attributes:
+        feature: As vision gave it.
+        observer: Where the camera was.
+        height: Of the point seen [m].
+        has_range: Whether its elevation tells the range.
+        noise: (m, m) of its own angles, without the error of the camera's pose [rad^2].
+    """
 
     def __init__(
-        self, feature: Feature, observer: Observer, height: float, extra_spread: tuple[float, float] = (0.0, 0.0)
+        self,
+        feature: Feature,
+        observer: Observer,
+        height: float,
+        camera: CameraErrorParameters,
+        extra_spread: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         """Prepare a sighting.
 
@@ -53,8 +105,10 @@ class Sighting:
             feature: Of a ball or an opponent.
             observer: Where the camera was.
             height: Of the point that the feature shows, above the ground [m].
+            camera: How far its pose may be off.
             extra_spread: Added to the feature's spreads: azimuth, elevation [rad].
         """
+        own = own_spread(feature, camera)
         self.feature = feature
         self.observer = observer
         self.height = height
@@ -62,20 +116,22 @@ class Sighting:
         rows = 2 if self.has_range else 1
         self._angles = np.array([feature.azimuth, feature.elevation])[:rows]
         self.noise = np.diag(
-            [
-                feature.azimuth_spread**2 + extra_spread[0] ** 2,
-                feature.elevation_spread**2 + extra_spread[1] ** 2,
-            ]
+            [own.azimuth_spread**2 + extra_spread[0] ** 2, own.elevation_spread**2 + extra_spread[1] ** 2]
         )[:rows, :rows]
 
-    def innovation(self, position: Array) -> tuple[Array, Array]:
-        """Return the (m,) innovation of a point of odom and the (m, 2) Jacobian of its angles by the point."""
-        angles, jacobian = self.observer.direction(position, self.height)
+    def innovation(self, position: Array, error: Array) -> tuple[Array, Array]:
+        """Return the (m,) innovation of a point of odom, and the (m, 5) Jacobian of its angles.
+
+        Args:
+            position: (2,) of odom [m].
+            error: (3,) of the camera's pose [rad].
+        """
+        angles, jacobian = self.observer.seen(position, self.height, error)
         rows = len(self._angles)
         return wrap(self._angles - angles[:rows]), jacobian[:rows]
 
-    def position(self) -> tuple[Array, Array]:
-        """Return where in odom (2,) the ray meets the object's height, and its (2, 2) covariance [m].
+    def place(self) -> Place:
+        """Return where in odom the ray meets the object's height.
 
         Raises:
             ValueError: if the elevation is unknown or not below the horizon.
@@ -86,24 +142,8 @@ class Sighting:
         point, by_ray = meet_plane(unit, self.observer.camera_position, self.height)
         rotation = self.observer.pose.rotation()
         jacobian = rotation @ by_ray[0] @ by_angles[0]
-        return np.array(self.observer.pose.transform(point[0])), jacobian @ self.noise @ jacobian.T
-
-
-def lasting_spread(spread: float, lasts: float, period: float) -> float:
-    """Return what must be added to an error's standard deviation because successive measurements share it.
-
-    An error that dies out with a time constant T, sampled every dt, averages out like white noise whose variance is
-    coth(dt / 2T) times larger: a filter that takes it for white must be told that one.
-
-    Args:
-        spread: Standard deviation of the error.
-        lasts: T [s].
-        period: dt [s]; 0 for a first measurement.
-
-    Returns:
-        The standard deviation e with spread^2 + e^2 = spread^2 coth(dt / 2T).
-    """
-    return 0.0 if period <= 0.0 else spread * math.sqrt(1.0 / math.tanh(0.5 * period / lasts) - 1.0)
+        by_error = rotation @ by_ray[0] @ -by_turn(unit)[0]  # the ray is turned back by the error
+        return Place(np.array(self.observer.pose.transform(point[0])), jacobian @ self.noise @ jacobian.T, by_error)
 
 
 def in_view(features: Features, angles: Array, margin: float) -> bool:

@@ -16,6 +16,7 @@ from tulip_description.planar import Pose2D
 from tulip_motion.interface import Odometry
 from tulip_vision.features import Features
 from tulip_worldmodel.ball_filter import BallFilter, BallParameters
+from tulip_worldmodel.camera_error import CameraErrorParameters
 from tulip_worldmodel.localization import Localization
 from tulip_worldmodel.localization_parameters import LocalizationParameters
 from tulip_worldmodel.moving_point import PointEstimate
@@ -32,6 +33,7 @@ Array = NDArray[np.float64]
 class WorldModelParameters:
     """Parameters of the world model and its parts."""
 
+    camera: CameraErrorParameters = field(default_factory=CameraErrorParameters)
     localization: LocalizationParameters = field(default_factory=LocalizationParameters)
     ball: BallParameters = field(default_factory=BallParameters)
     opponents: OpponentParameters = field(default_factory=OpponentParameters)
@@ -62,9 +64,9 @@ class WorldModel:
             start: base_footprint in map when the first odometry comes.
         """
         self._parameters = parameters
-        self._localization = Localization(parameters.localization, field, start)
-        self._ball = BallFilter(parameters.ball, field.ball_radius)
-        self._opponents = OpponentFilter(parameters.opponents)
+        self._localization = Localization(parameters.localization, field, start, parameters.camera)
+        self._ball = BallFilter(parameters.ball, field.ball_radius, parameters.camera)
+        self._opponents = OpponentFilter(parameters.opponents, parameters.camera)
         self._history = OdometryHistory(2.0 * parameters.greatest_delay)
         self._now: PathPoint | None = None  # where and when all filters stand
         self._last_picture: int | None = None  # stamp [ns]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_description.planar import Pose2D
+from tulip_worldmodel.rolling import DECELERATION, rest
 
 Array = NDArray[np.float64]
 
@@ -53,6 +54,21 @@ class ObjectEstimate:
 
 
 @dataclass(frozen=True)
+class BallRest:
+    """Where a rolling ball will stop by itself, and when.
+
+    Attributes:
+        position: (2,) in base_footprint of now [m].
+        position_in_map: (2,) [m].
+        after: From the state's stamp [s]; 0 for a ball that rests.
+    """
+
+    position: Array
+    position_in_map: Array
+    after: float
+
+
+@dataclass(frozen=True)
 class WorldState:
     """The world at one instant.
 
@@ -67,3 +83,12 @@ class WorldState:
     robot: RobotEstimate
     ball: ObjectEstimate | None
     opponents: tuple[ObjectEstimate, ...]
+
+    @property
+    def ball_rest(self) -> BallRest | None:
+        """Where the ball will stop and when, if nothing meets it; None while it is not known."""
+        if self.ball is None:
+            return None
+        position, after = rest(self.ball.position, self.ball.velocity, DECELERATION)
+        in_map, _ = rest(self.ball.position_in_map, self.ball.velocity_in_map, DECELERATION)
+        return BallRest(position, in_map, after)

@@ -58,9 +58,9 @@ ROWS = [
 def test_bench_has_twenty_walks_and_a_hundred_kidnappings_with_real_vision() -> None:
     assert [trial[0] for trial in BENCH.trials] == ["walk"] * 20 + ["kidnap"] * 100
     assert all(len(trial) == 2 for trial in BENCH.trials)
-    assert settings_of("vision").perception is None
+    assert settings_of("vision", 0).perception is None
     with pytest.raises(ValueError, match="perception is 'eyes'"):
-        settings_of("eyes")
+        settings_of("eyes", 0)
 
 
 def test_summary_gives_rmse_share_inside_the_bound_and_what_became_of_the_kidnapped() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from walk_simulation import CAMERA, ROUGH, Errors, Simulation, stand, tour
+from walk_simulation import CAMERA, ROUGH_WORLD, Errors, Simulation, stand, tour
 
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.field import load_field
@@ -17,11 +17,11 @@ from tulip_description.robot import load_robot
 from tulip_vision.features import Feature, FeatureClass, Features
 from tulip_vision.lens import head_camera_lens
 from tulip_vision.view import SpreadParameters, View
-from tulip_worldmodel.ball_filter import BallParameters
-from tulip_worldmodel.localization import LEAST_SPREAD, Localization, own_spread
+from tulip_worldmodel.camera_error import LEAST_SPREAD, CameraErrorParameters, own_spread
+from tulip_worldmodel.localization import Localization
 from tulip_worldmodel.localization_parameters import LocalizationParameters
 from tulip_worldmodel.odometry_history import Increment
-from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
+from tulip_worldmodel.world_model import WorldModel
 
 START = Pose2D(-1.5, 0.3, 0.2)
 FIELD = load_field()
@@ -29,7 +29,7 @@ FIELD = load_field()
 
 def errors_of(simulation: Simulation, guess: Pose2D) -> tuple[np.ndarray, np.ndarray]:
     """Return (n, 3) pose errors and (n,) their normalised squares, one row a tick."""
-    world = WorldModel(WorldModelParameters(localization=ROUGH), FIELD, guess)
+    world = WorldModel(ROUGH_WORLD, FIELD, guess)
     errors, normalised = [], []
     for moment in simulation.run():
         world.add_odometry(moment.odometry)
@@ -213,7 +213,7 @@ def test_covariance_stays_symmetric_and_positive_semidefinite_whatever_is_seen(s
         assert -math.pi <= localization.pose.yaw < math.pi
 
 
-@pytest.mark.parametrize("wrong", [{"pose_error_time": 0.0}, {"gate_probability": 1.0}, {"association_odds": 0.5}])
+@pytest.mark.parametrize("wrong", [{"drift_time": 0.0}, {"gate_probability": 1.0}, {"association_odds": 0.5}])
 def test_parameters_out_of_range_are_refused_by_name(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         LocalizationParameters(**wrong)
@@ -222,18 +222,17 @@ def test_parameters_out_of_range_are_refused_by_name(wrong: dict[str, float]) ->
 def test_camera_pose_spread_is_visions_and_counted_once() -> None:
     """Taken out of what vision claims, it leaves a feature nothing of its own if there was nothing else."""
     spread = SpreadParameters(pixel=0.0)
-    parameters = LocalizationParameters()
-    assert parameters.pose_azimuth_spread == spread.pose_azimuth == BallParameters().pose_azimuth_spread
-    assert parameters.pose_elevation_spread == spread.pose_elevation == BallParameters().pose_elevation_spread
+    camera = CameraErrorParameters()
+    assert (camera.pose_azimuth_spread, camera.pose_elevation_spread) == (spread.pose_azimuth, spread.pose_elevation)
     view = View(head_camera_lens(), camera_in_footprint(load_robot(), 0.9, (0.0, 0.0, 0.0, 1.0), 0.3, 0.4), spread)
     ray = np.array([0.8, 0.2, -0.5]) / np.linalg.norm([0.8, 0.2, -0.5])
     azimuth_spread, elevation_spread = view.spreads(ray)
     azimuth, elevation = math.atan2(ray[1], ray[0]), math.asin(ray[2])
     kind = FeatureClass.PENALTY_MARK
     whole = Feature(kind, azimuth, elevation, azimuth_spread, elevation_spread, 0.9)
-    own = own_spread(whole, parameters, 1.0)
+    own = own_spread(whole, camera)
     assert (own.azimuth_spread, own.elevation_spread) == (LEAST_SPREAD, LEAST_SPREAD)
     noisy = replace(whole, azimuth_spread=math.hypot(azimuth_spread, 0.01), elevation_spread=0.02)
-    own = own_spread(noisy, parameters, 1.0)
+    own = own_spread(noisy, camera)
     assert own.azimuth_spread == pytest.approx(0.01)
     assert own.elevation_spread == pytest.approx(math.sqrt(0.02**2 - spread.pose_elevation**2))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from walk_simulation import ROUGH, Errors, Moment, Simulation, stand, tour
+from walk_simulation import ROUGH, ROUGH_WORLD, Errors, Moment, Simulation, stand, tour
 
 from tulip_description.field import Field, load_field
 from tulip_description.planar import Pose2D, wrap_angle
@@ -18,7 +18,7 @@ from tulip_worldmodel.localization import Localization
 from tulip_worldmodel.localization_parameters import LocalizationParameters
 from tulip_worldmodel.odometry_history import Increment
 from tulip_worldmodel.pose_seeds import SeedFinder
-from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
+from tulip_worldmodel.world_model import WorldModel
 
 FIELD = load_field()
 BARE = FIELD.without_poles()
@@ -64,7 +64,7 @@ class Course:
 
 
 def follow(moments: Iterator[Moment], guess: Pose2D, arena: Field, parameters: LocalizationParameters) -> Course:
-    world = WorldModel(WorldModelParameters(localization=parameters), arena, guess)
+    world = WorldModel(replace(ROUGH_WORLD, localization=parameters), arena, guess)
     errors, lost = [], []
     for moment in moments:
         world.add_odometry(moment.odometry)
@@ -120,7 +120,7 @@ def test_robot_that_sees_only_false_crossings_is_lost_and_says_so_by_its_covaria
 def test_uncertainty_without_features_covers_the_error_of_dead_reckoning() -> None:
     inside = []
     for seed in range(6):
-        world = WorldModel(WorldModelParameters(localization=ROUGH), FIELD, START)
+        world = WorldModel(ROUGH_WORLD, FIELD, START)
         sim = Simulation(tour, 30.0, START, np.random.default_rng(seed), Errors(vision=False, heading_drift=0.01))
         for moment in sim.run():
             world.add_odometry(moment.odometry)

@@ -1,12 +1,9 @@
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
 from tulip_worldmodel.rolling import rest, slowed, slowing
-from tulip_worldmodel.sighting import lasting_spread
 
 
 def test_ball_comes_to_rest_where_and_when_small_steps_bring_it() -> None:
@@ -36,15 +33,3 @@ def test_moments_after_friction_are_those_of_a_cloud_of_balls(velocity: tuple[fl
 def test_velocity_known_exactly_loses_exactly_what_friction_takes() -> None:
     found = slowing(np.array([3.0, 4.0]), np.zeros((2, 2)), 0.3, 1.0)
     assert found.keep @ [3.0, 4.0] + found.drop == pytest.approx([2.82, 3.76], abs=1e-6)
-
-
-def test_lasting_error_averages_out_like_white_noise_of_the_spread_given() -> None:
-    """The variance of the mean of many samples of an AR(1) process, against that of white noise."""
-    period, lasts, spread = 0.064, 0.5, 0.2
-    keep = math.exp(-period / lasts)
-    n = 4000
-    lags = np.arange(1, n)
-    of_mean = spread**2 / n * (1.0 + 2.0 * np.sum((1.0 - lags / n) * keep**lags))
-    white = math.hypot(spread, lasting_spread(spread, lasts, period))
-    assert white**2 / n == pytest.approx(of_mean, rel=0.01)
-    assert lasting_spread(spread, lasts, 0.0) == 0.0

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from walk_simulation import ROUGH, Errors, Simulation, stand, tour
+from walk_simulation import ROUGH, ROUGH_CAMERA, ROUGH_WORLD, Errors, Simulation, stand, tour
 
 from tulip_description.field import Field, load_field
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_worldmodel.localization_parameters import LocalizationParameters
 from tulip_worldmodel.noise_scale import NoiseScale
 from tulip_worldmodel.pose_filter import PoseFilter
-from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
+from tulip_worldmodel.world_model import WorldModel
 
 FIELD = load_field()
 BARE = FIELD.without_poles()
@@ -24,7 +24,7 @@ MIRRORED = Pose2D(-START.x, -START.y, START.yaw + math.pi)
 
 def follow(simulation: Simulation, guess: Pose2D, arena: Field) -> np.ndarray:
     """Return errors of position [m] and heading [rad], and the noise scale, (n, 3), one row a tick."""
-    world = WorldModel(WorldModelParameters(localization=ROUGH), arena, guess)
+    world = WorldModel(ROUGH_WORLD, arena, guess)
     errors = []
     for moment in simulation.run():
         world.add_odometry(moment.odometry)
@@ -69,7 +69,7 @@ def test_without_poles_a_robot_told_the_wrong_half_cannot_know_and_does_not_chan
 
 
 def test_turning_round_twice_is_the_same_hypothesis_again() -> None:
-    hypothesis = PoseFilter(ROUGH, START, (0.3, 0.2, 0.1))
+    hypothesis = PoseFilter(ROUGH, ROUGH_CAMERA, START, (0.3, 0.2, 0.1))
     hypothesis.side = 2.0
     before, spread = hypothesis.pose, hypothesis.covariance
     hypothesis.turn_round()
@@ -81,8 +81,8 @@ def test_turning_round_twice_is_the_same_hypothesis_again() -> None:
 
 
 def test_absorbing_gives_the_moments_of_the_mixture() -> None:
-    first = PoseFilter(ROUGH, Pose2D(1.0, 0.0, math.pi - 0.1), (0.1, 0.1, 0.05))
-    second = PoseFilter(ROUGH, Pose2D(1.4, 0.2, -math.pi + 0.1), (0.3, 0.3, 0.1))
+    first = PoseFilter(ROUGH, ROUGH_CAMERA, Pose2D(1.0, 0.0, math.pi - 0.1), (0.1, 0.1, 0.05))
+    second = PoseFilter(ROUGH, ROUGH_CAMERA, Pose2D(1.4, 0.2, -math.pi + 0.1), (0.3, 0.3, 0.1))
     first.absorb(second, 0.25)
     assert first.pose.as_array() == pytest.approx([1.1, 0.05, math.pi - 0.05], abs=1e-9)
     rng = np.random.default_rng(0)

@@ -17,7 +17,9 @@ from tulip_description.field import CrossingKind, Field, load_field
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.interface import Odometry
 from tulip_vision.features import Feature, FeatureClass, Features
+from tulip_worldmodel.camera_error import CameraErrorParameters
 from tulip_worldmodel.localization_parameters import LocalizationParameters
+from tulip_worldmodel.world_model import WorldModelParameters
 
 Array = NDArray[np.float64]
 CAMERA = np.array([0.05, 0.0, 1.15])
@@ -57,12 +59,15 @@ ROUGH = LocalizationParameters(
     heading_noise_per_radian=math.radians(2.0),
     heading_noise_per_second=math.radians(0.3),
     drift_spread=0.02,
-    pose_azimuth_spread=Errors.azimuth_bias,
-    pose_elevation_spread=Errors.tilt_spread,
-    pose_error_time=Errors.tilt_time,
     landmark_spread=Errors.landmark_spread,
 )
 """What fits the errors of this walk: feet that slip, an IMU that drifts, play in the neck, lines painted by hand."""
+ROUGH_CAMERA = CameraErrorParameters(
+    pose_azimuth_spread=Errors.azimuth_bias,
+    pose_elevation_spread=Errors.tilt_spread,
+    pose_error_time=Errors.tilt_time,
+)
+ROUGH_WORLD = WorldModelParameters(camera=ROUGH_CAMERA, localization=ROUGH)
 
 
 @dataclass(frozen=True)

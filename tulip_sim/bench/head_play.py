@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,8 @@ class HeadPlay:
         head: (2,) pan and tilt [rad].
         stamp: [ns].
         state: What the world model says; new at each decision.
+        opponents: Where they stand, in map; the first hides what is behind it, the others hide nothing.
+        opponents_in_picture: Which of them the last picture showed, found or not.
         ball_in_picture: Whether the last picture showed the ball, found or not.
     """
 
@@ -79,6 +82,8 @@ class HeadPlay:
         self.stamp = 0
         self.pictures = 0
         self.ball_in_picture = False
+        self.opponents: list[Pose2D] = []
+        self.opponents_in_picture: list[bool] = []
         self.state: WorldState | None = None
 
     def go(self, seconds: float, decide: Callable[[HeadPlay], tuple[HeadCommand, Velocity]]) -> None:
@@ -119,6 +124,13 @@ class HeadPlay:
         head = self.head + self._head_velocity * since
         truth = self._truth(head)
         glimpses = self._perception.in_view(truth)
+        of_first = any(each.kind is FeatureClass.OPPONENT for each in glimpses)
+        self.opponents_in_picture = [of_first][: len(self.opponents)]
+        for other in self.opponents[1:]:
+            alone = self._perception.in_view(replace(truth, keeper=other))
+            shown = tuple(each for each in alone if each.kind is FeatureClass.OPPONENT)
+            self.opponents_in_picture.append(bool(shown))
+            glimpses += shown
         self.ball_in_picture = any(each.kind is FeatureClass.BALL for each in glimpses)
         noticed = self._perception.noticed(glimpses, truth, self._rng)
         believed = self._sway.of(self.camera(head), CAMERA_TICKS * SECONDS)
@@ -146,7 +158,7 @@ class HeadPlay:
             ball_orientation=np.array(UPRIGHT),
             ball_linear_velocity=np.array([*self.ball_velocity, 0.0]),
             ball_angular_velocity=still,
-            keeper=None,
+            keeper=self.opponents[0] if self.opponents else None,
             keeper_path=(),
             foot_touches=(0, 0),
             body_touches=0,

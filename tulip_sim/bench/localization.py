@@ -17,6 +17,7 @@ from tulip_description.field import Field, load_field
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_sim.bench.guided import GuidedWalk
 from tulip_sim.bench.runner import Bench, Row
+from tulip_sim.camera import CameraParameters
 from tulip_sim.keeper import Keeper
 from tulip_sim.lockstep import Settings
 from tulip_sim.perception import PerceptionParameters
@@ -38,15 +39,17 @@ STAYS = 1.0  # [s] that it must have known its place by then
 FOUND = (0.3, math.radians(10.0))  # [m], [rad] it is found when it errs by less, and does not call itself lost
 MIRRORED = math.radians(150.0)  # [rad] a heading that errs by more, with a place turned about the centre, is mirrored
 CLEAR = 0.7  # [m] from the ball, of ways to walk: nobody kicks it
+MOUNT_ANGLE, MOUNT_HEIGHT = math.radians(0.15), 0.005  # [rad], [m] what calibrate.py mount leaves (docs/vision.md)
 MARGIN = 0.8  # [m] from the outer lines, of places to walk to and to be put at
 ENLARGED = 20.0  # ellipses in the picture: in their own size they are points
 BOUND = float(chi2.ppf(0.95, df=3))  # of the NEES of (x, y, yaw): 95 of 100 lie below if the covariance is right
 
 
-def settings_of(perception: str) -> Settings:
-    """Return the parameters of all cores.
+def settings_of(perception: str, seed: int) -> Settings:
+    """Return the parameters of all cores, with a camera that sits as calibration leaves it.
 
     Args:
+        seed: Of how the camera sits.
         perception: "vision" for rendered pictures and real vision, which alone counts; "quick" for features from the
             truth with errors, "ideal" for those without.
 
@@ -56,7 +59,8 @@ def settings_of(perception: str) -> Settings:
     known = {"vision": None, "quick": PerceptionParameters(), "ideal": PerceptionParameters.ideal()}
     if perception not in known:
         raise ValueError(f"perception is {perception!r}; expected one of {', '.join(known)}")
-    return Settings(perception=known[perception])
+    camera = CameraParameters(mount_angle=MOUNT_ANGLE, mount_height=MOUNT_HEIGHT, mount_seed=seed)
+    return Settings(camera=camera, perception=known[perception])
 
 
 def walk(seed: int, perception: str = "vision") -> Row:
@@ -68,7 +72,7 @@ def walk(seed: int, perception: str = "vision") -> Row:
     belief = Pose2D(start.x + off * math.cos(turn), start.y + off * math.sin(turn), start.yaw + twist)
     scenario = _scenario(start, seed, rng, field)
     places = _way_round(start, scenario.ball, rng, field)
-    robot = GuidedWalk(scenario, seed, places, settings_of(perception), belief)
+    robot = GuidedWalk(scenario, seed, places, settings_of(perception, seed), belief)
     looks, distance = [], 0.0
     try:
         last = robot.world.truth().footprint
@@ -113,7 +117,7 @@ def kidnap(seed: int, perception: str = "vision") -> Row:
     """Put a standing robot somewhere else, and see whether and when it finds itself again."""
     field, rng = load_field(), np.random.default_rng([seed, 12])
     start, target = _place(rng, field), _place(rng, field)
-    robot = GuidedWalk(_scenario(start, seed, rng, field), seed, (), settings_of(perception))
+    robot = GuidedWalk(_scenario(start, seed, rng, field), seed, (), settings_of(perception, seed))
     noticed: float | None = None
     found: float | None = None
     known_before = False
@@ -266,7 +270,10 @@ def _rounded(values: Array) -> list[float]:
 def _source(quick: Sequence[str]) -> str:
     if quick:
         return f"**Features from the truth ({', '.join(quick)}), not from pictures: a quick look, no result.**"
-    return "Rendered camera, real vision, randomised robots."
+    return (
+        "Rendered camera, real vision, randomised robots, the camera off by up to"
+        f" {math.degrees(MOUNT_ANGLE):.2f} deg and {1000.0 * MOUNT_HEIGHT:.0f} mm as its calibration leaves it."
+    )
 
 
 def _about_walks(walks: Sequence[Row]) -> list[str]:
