@@ -31,7 +31,8 @@ class CameraErrorParameters:
 
     pose_azimuth_spread: float = SpreadParameters.pose_azimuth  # [rad] heading
     pose_elevation_spread: float = SpreadParameters.pose_elevation  # [rad] roll and pitch
-    pose_error_time: float = 0.5  # [s] how long an error lasts: about a step, or a turn of the head
+    pose_error_time: float = 5.0  # [s] how long an error lasts: mount and IMU always, the gait's a step, turns of the
+    # head in between. Too short, and errors that stay are averaged away in belief only.
 
     def __post_init__(self) -> None:
         """Check the values.

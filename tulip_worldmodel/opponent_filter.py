@@ -12,6 +12,7 @@ from tulip_description.planar import wrap_angle
 from tulip_vision.features import FeatureClass, Features
 from tulip_worldmodel.association import assign
 from tulip_worldmodel.camera_error import CameraErrorParameters
+from tulip_worldmodel.direction import HORIZON
 from tulip_worldmodel.mahalanobis import gate
 from tulip_worldmodel.moving_point import MovingPoint, PointEstimate, PointMotion, check_tracking, position_noise
 from tulip_worldmodel.odometry_history import Increment
@@ -156,8 +157,24 @@ class OpponentFilter:
         self._merge()
         return tuple(rejected)
 
-    def hides(self, angles: Array, distance: float, observer: Observer) -> bool:
-        """Tell whether a confirmed opponent stands in front of a point at (2,) angles and a distance [m]."""
+    def hides(self, angles: Array, distance: float, observer: Observer, features: Features) -> bool:
+        """Tell whether an opponent stands in front of a point.
+
+        Args:
+            angles: (2,) of the point.
+            distance: Of the point along the ground [m].
+            observer: Where the camera was.
+            features: Of the picture, for opponents so near that their feet are below it: they have no range, and may
+                not be confirmed.
+        """
+        lowest = float(features.view[2])
+        if lowest < HORIZON:
+            farthest = float(observer.camera_position[2]) / math.tan(-lowest)  # their feet would be seen further away
+            half_width = math.atan2(self._parameters.body_radius, farthest)
+            for feature in features.features:
+                if feature.kind is FeatureClass.OPPONENT and math.isnan(feature.elevation) and farthest < distance:
+                    if abs(wrap_angle(feature.azimuth - float(angles[0]))) < half_width:
+                        return True
         for opponent in self.confirmed:
             seen, _ = observer.direction(opponent.point.state[:2], GROUND)
             offset = observer.offset(opponent.point.state[:2], GROUND)[0]

@@ -111,7 +111,7 @@ class WorldModel:
         return (
             *self._localization.update(features, since_last),
             *self._opponents.update(features, observer, since_last),
-            *self._ball.update(features, observer, since_last, self._ball_is_hidden(observer)),
+            *self._ball.update(features, observer, since_last, self._ball_is_hidden(observer, features)),
         )
 
     def state(self, stamp: int) -> WorldState:
@@ -150,13 +150,13 @@ class WorldModel:
         self._opponents.predict(moved, here)
         self._now = then
 
-    def _ball_is_hidden(self, observer: Observer) -> bool:
+    def _ball_is_hidden(self, observer: Observer, features: Features) -> bool:
         if not self._ball.known:
             return False
         position = self._ball.point.state[:2]
         angles, _ = observer.direction(position, 0.0)
         offset = observer.offset(position, 0.0)[0]
-        return self._opponents.hides(angles, float(np.hypot(offset[0], offset[1])), observer)
+        return self._opponents.hides(angles, float(np.hypot(offset[0], offset[1])), observer, features)
 
 
 def _estimate(

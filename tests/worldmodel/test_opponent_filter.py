@@ -88,9 +88,17 @@ def test_sighting_without_range_turns_a_known_opponent_but_bears_none() -> None:
 def test_confirmed_opponent_hides_what_stands_behind_it_only() -> None:
     opponents = OpponentFilter(OpponentParameters())
     feed(opponents, shot((2.0, 0.0)), 5)
-    assert opponents.hides(np.array([0.02, -0.3]), 3.0, OBSERVER)
-    assert not opponents.hides(np.array([0.02, -0.3]), 1.5, OBSERVER)
-    assert not opponents.hides(np.array([0.5, -0.3]), 3.0, OBSERVER)
+    assert opponents.hides(np.array([0.02, -0.3]), 3.0, OBSERVER, shot())
+    assert not opponents.hides(np.array([0.02, -0.3]), 1.5, OBSERVER, shot())
+    assert not opponents.hides(np.array([0.5, -0.3]), 3.0, OBSERVER, shot())
+
+
+def test_opponent_whose_feet_are_below_the_picture_hides_what_is_behind_it_though_its_range_is_unknown() -> None:
+    opponents = OpponentFilter(OpponentParameters())
+    near = shot((0.5, 0.0), bearing_only=True)  # the picture's lower edge shows the ground 0.6 m ahead
+    assert opponents.hides(np.array([0.1, -0.4]), 2.5, OBSERVER, near)
+    assert not opponents.hides(np.array([0.1, -0.4]), 0.4, OBSERVER, near)
+    assert not opponents.hides(np.array([0.8, -0.4]), 2.5, OBSERVER, near)
 
 
 def test_walking_robot_knows_a_standing_keeper_within_30_cm_in_map() -> None:
