@@ -27,6 +27,8 @@ COLOURS: dict[FeatureClass, Colour] = {
     FeatureClass.POLE_YELLOW_BLUE_YELLOW: (255, 200, 150),
     FeatureClass.POLE_BLUE_YELLOW_BLUE: (255, 200, 150),
     FeatureClass.PENALTY_MARK: (255, 255, 255),
+    FeatureClass.CENTRE_CIRCLE: (200, 120, 120),
+    FeatureClass.FIELD_BORDER: (0, 255, 120),
 }
 """BGR of each class."""
 
@@ -40,6 +42,7 @@ LABELS = {
     FeatureClass.POLE_YELLOW_BLUE_YELLOW: "pole YBY",
     FeatureClass.POLE_BLUE_YELLOW_BLUE: "pole BYB",
     FeatureClass.PENALTY_MARK: "mark",
+    FeatureClass.CENTRE_CIRCLE: "circle",
 }
 
 REFUSED: Colour = (60, 60, 255)
@@ -86,7 +89,7 @@ def _name(kind: FeatureClass) -> str:
 
 def _draw(drawn: NDArray[np.uint8], feature: Feature, view: View) -> None:
     colour = COLOURS[feature.kind]
-    if feature.kind == FeatureClass.LINE:
+    if not math.isnan(feature.end_azimuth):
         share = np.linspace(0.0, 1.0, 12)[:, None]
         ends = np.stack(
             [direction_of(feature.azimuth, feature.elevation), direction_of(feature.end_azimuth, feature.end_elevation)]

@@ -117,6 +117,8 @@ def _examine(
     if residual > max(1.2 * pixel, 0.12 * radius):
         return f"not round: edge off by {residual / pixel:.1f} px"
 
+    if not free.all() and not view.inside(view.pixels_of_directions(centre[None]))[0]:
+        return "its middle is out of the picture"  # a sliver at the edge fits many circles
     down = -float(centre[2])
     above_centre = view.height - parameters.radius
     if down <= 1e-3 or above_centre <= 0.0:

@@ -28,6 +28,10 @@ class FeatureClass(IntEnum):
     """Direction of the pole's foot, as for GOAL_POST."""
     POLE_BLUE_YELLOW_BLUE = 8
     PENALTY_MARK = 9
+    CENTRE_CIRCLE = 10
+    """Direction of the circle's middle on the ground, which need not be in the picture."""
+    FIELD_BORDER = 11
+    """A straight edge of the carpet, where green ends; both ends given, as for LINE."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,7 @@ class Feature:
         elevation: [rad], positive up; NaN where it is not known.
         azimuth_spread, elevation_spread: Standard deviations [rad].
         confidence: 0 to 1.
-        end_azimuth, end_elevation: Other end of a LINE [rad], else NaN.
+        end_azimuth, end_elevation: Other end of a LINE or FIELD_BORDER [rad], else NaN.
         angular_radius: Half the angle that a BALL fills [rad], else NaN.
     """
 

@@ -22,6 +22,10 @@ FAR_NEIGHBOURHOOD = 0.65
 """Neighbourhood of far points over that of near ones."""
 CIRCLE_ALIGNMENT = math.sin(math.radians(25.0))
 """Largest deviation of a point's own direction from the circle's."""
+CIRCLE_DOUBT = 2.0
+"""How many times less sure the middle is than a point that is seen: a part of the circle is extrapolated from."""
+SURE_CIRCLE = 120.0
+"""Points of a circle that is seen whole from some metres."""
 VOTE_CELL = 0.15
 """[m] a quarter of a right angle's direction error at the radius."""
 SECTORS = 24
@@ -141,8 +145,8 @@ def find_lines(points: LinePoints, view: View, parameters: LineParameters) -> Li
 
 
 def line_features(lines: Lines, view: View) -> tuple[Feature, ...]:
-    """Return a LINE feature for each straight piece."""
-    features = []
+    """Return a LINE feature for each straight piece, and CENTRE_CIRCLE if there is one."""
+    features = [] if lines.circle is None else [_circle_feature(lines.circle, view)]
     for piece in lines.pieces:
         ends = np.column_stack([np.stack([piece.start, piece.end]), np.zeros(2)]) - view.position
         ends /= np.linalg.norm(ends, axis=1, keepdims=True)
@@ -164,6 +168,17 @@ def line_features(lines: Lines, view: View) -> tuple[Feature, ...]:
             )
         )
     return tuple(features)
+
+
+def _circle_feature(circle: CentreCircle, view: View) -> Feature:
+    ray = np.array([*circle.centre, 0.0]) - view.position
+    ray /= np.linalg.norm(ray)
+    azimuth, elevation = angles(ray[None])
+    azimuth_spread, elevation_spread = view.spreads(ray, CIRCLE_DOUBT)
+    confidence = min(1.0, circle.points / SURE_CIRCLE)
+    return Feature(
+        FeatureClass.CENTRE_CIRCLE, float(azimuth[0]), float(elevation[0]), azimuth_spread, elevation_spread, confidence
+    )
 
 
 def _find_circle(

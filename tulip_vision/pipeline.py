@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tulip_vision.annotation import annotate
 from tulip_vision.ball import BallParameters, find_ball
+from tulip_vision.border import BorderParameters, find_border
 from tulip_vision.crossings import CrossingParameters, find_crossings, find_penalty_marks
 from tulip_vision.features import Feature, Features
 from tulip_vision.findings import Findings, Refusal
@@ -38,6 +39,7 @@ class VisionParameters:
     line_points: LinePointParameters = field(default_factory=LinePointParameters)
     lines: LineParameters = field(default_factory=LineParameters)
     crossings: CrossingParameters = field(default_factory=CrossingParameters)
+    border: BorderParameters = field(default_factory=BorderParameters)
 
     def __post_init__(self) -> None:
         """Check that each part has its own type.
@@ -92,7 +94,7 @@ INPUTS = ("picture", "view")
 SMALLEST = 16
 """[px] width and height of a picture: the search for the carpet looks at two columns of it then."""
 
-DETECTORS = ("ball", "goal_posts", "poles", "opponents", "crossings", "penalty_marks")
+DETECTORS = ("ball", "goal_posts", "poles", "opponents", "crossings", "penalty_marks", "border")
 """Values of type `Findings`; their features are the result, together with the lines."""
 
 
@@ -132,6 +134,7 @@ def stages(parameters: VisionParameters, own_body: OwnBody | None = None) -> tup
             "penalty_marks",
             lambda lines, s, v: find_penalty_marks(lines, s, v, p.crossings),
         ),
+        Stage("find border", seen, "border", lambda s, v: find_border(s, v, p.border)),
     )
 
 

@@ -25,6 +25,15 @@ Picture = NDArray[np.uint8]
 LUT_TAKES_WORDS = int(cv2.__version__.split(".")[0]) >= 5
 """Whether `cv2.LUT` looks up 16-bit indices: a quarter of the time of `np.take`."""
 
+FAINT = 0.1
+"""Value below which colours are not told apart, 0 to 1."""
+YELLOWER = 8.0
+"""[deg] by which green may begin before its box does, where the carpet is yellowish."""
+SCATTER = 12.0
+"""[deg] of the carpet's hue about its median."""
+HUE_STEP = 4.0
+"""[deg] between the tables that are made for yellowish carpets."""
+
 LEAST_COSINE = 0.1
 """Of the angle to the optical axis, 84 deg, up to which the carpet's outline is looked for."""
 
@@ -199,18 +208,21 @@ class Segmenter:
     def __init__(self, parameters: SegmentationParameters) -> None:
         """Make a segmenter; its colour tables are made when first needed."""
         self._parameters = parameters
-        self._tables: dict[int, NDArray[np.uint8]] = {}
+        self._tables: dict[tuple[int, int], NDArray[np.uint8]] = {}
 
-    def table(self, brightness: float) -> NDArray[np.uint8]:
+    def table(self, brightness: float, green_from: float | None = None) -> NDArray[np.uint8]:
         """Return the (65536,) colour table for a carpet of this brightness over the reference brightness.
+
+        Green may begin at another hue than that of its box [deg], which moves yellow's end, too.
 
         Colours have 15 bits; the upper half is empty, and there because `cv2.LUT` takes tables of this size only.
         """
         step = math.log(self._parameters.brightness_step)
         level = int(np.clip(round(math.log(max(brightness, 1e-3)) / step), -8, 5))
-        if level not in self._tables:
-            self._tables[level] = self._make_table(math.exp(level * step))
-        return self._tables[level]
+        shift = 0 if green_from is None else round((self._parameters.colours.green.hue[0] - green_from) / HUE_STEP)
+        if (level, shift) not in self._tables:
+            self._tables[level, shift] = self._make_table(math.exp(level * step), HUE_STEP * shift)
+        return self._tables[level, shift]
 
     def segment(self, picture: Picture, view: View, own_body: Mask | None = None) -> Segmentation:
         """Divide a picture into colour classes and find the carpet's outline.
@@ -220,10 +232,10 @@ class Segmenter:
             view: Of the picture.
             own_body: (height, width) 255 where the robot may see itself; None if it does not.
         """
-        brightness = self._brightness(picture)
+        brightness, green_from = self._carpet(picture)
         packed = cv2.cvtColor(picture, cv2.COLOR_BGR2BGR555)  # two bytes a pixel, little-endian: 0rrrrrgg gggbbbbb
         index = packed.view(np.uint16).reshape(picture.shape[:2])
-        classes = self._look_up(index, self.table(brightness))
+        classes = self._look_up(index, self.table(brightness, green_from))
         whiteness = self._look_up(index, WHITENESS)
         if own_body is None:
             own_body = np.zeros(classes.shape, dtype=np.uint8)
@@ -251,15 +263,21 @@ class Segmenter:
             return np.asarray(cv2.LUT(index, table.reshape(1, -1)), np.uint8)
         return np.take(table, index, mode="wrap")  # every index is inside: saves the check
 
-    def _make_table(self, brightness: float) -> NDArray[np.uint8]:
+    def _make_table(self, brightness: float, shift: float) -> NDArray[np.uint8]:
+        """Return the table for a brightness and for a green that begins at a hue lower by `shift` [deg]."""
         hue, saturation, value = self._cells
         table = np.zeros(2**16, dtype=np.uint8)
         for colour in Colour:
             box = self._parameters.colours.of(colour)
             low, high = box.hue
+            if colour is Colour.GREEN:
+                low -= shift
+            elif colour is Colour.YELLOW:
+                high -= shift
             in_hue = (hue >= low) & (hue <= high) if low <= high else (hue >= low) | (hue <= high)
             # An upper bound of 1 stays: nothing is too bright; a lower bound never asks for more than 0.8.
-            least = min(box.value[0] * brightness, 0.8)
+            # Below FAINT the camera's noise makes any hue.
+            least = min(max(box.value[0] * brightness, min(box.value[0], FAINT)), 0.8)
             most = 1.0 if box.value[1] >= 1.0 else min(box.value[1] * brightness, 1.0)
             fits = in_hue & (saturation >= box.saturation[0]) & (saturation <= box.saturation[1])
             table[: len(hue)][fits & (value >= least) & (value <= most)] |= int(colour)
@@ -280,20 +298,30 @@ class Segmenter:
         )
         return hue * 60.0, chroma / value, value
 
-    def _brightness(self, picture: Picture) -> float:
-        """Return the carpet's value over the reference, from every eighth pixel; 1 if there is hardly any green."""
+    def _carpet(self, picture: Picture) -> tuple[float, float]:
+        """Return the carpet's value over the reference and the hue at which green begins [deg], from some pixels.
+
+        Turf may be so yellowish that its hue scatters about the bound between the classes; that shows in the median of
+        what is green or a little yellower. If there is hardly any, the value is 1 and green begins where its box does.
+        """
         height, width = picture.shape[:2]
         small = cv2.resize(picture, (-(-width // 8), -(-height // 8)), interpolation=cv2.INTER_NEAREST)
         hsv = cv2.cvtColor(small, cv2.COLOR_BGR2HSV)
         box = self._parameters.colours.green
+        begins = box.hue[0]
         # OpenCV keeps hue / 2 in a byte.
-        low = (math.ceil(box.hue[0] / 2.0), math.ceil(255.0 * box.saturation[0]), 20)
-        green = cv2.inRange(hsv, low, (math.floor(box.hue[1] / 2.0), 255, 255))
-        count = np.cumsum(np.bincount(hsv[..., 2][green != 0], minlength=256))
-        if count[-1] < 0.02 * green.size:
-            return 1.0
-        median = int(np.searchsorted(count, 0.5 * count[-1]))
-        return median / 255.0 / self._parameters.reference_brightness
+        low = (math.ceil(max(begins - YELLOWER, 0.0) / 2.0), math.ceil(255.0 * box.saturation[0]), 20)
+        green = cv2.inRange(hsv, low, (math.floor(box.hue[1] / 2.0), 255, 255)) != 0
+        hue = np.cumsum(np.bincount(hsv[..., 0][green], minlength=256))
+        if hue[-1] < 0.02 * green.size:
+            return 1.0, begins
+        common = 2.0 * float(np.searchsorted(hue, 0.5 * hue[-1]))
+        if common < begins + SCATTER:
+            begins = max(common - SCATTER, begins - YELLOWER)
+        green &= hsv[..., 0] >= begins / 2.0
+        value = np.cumsum(np.bincount(hsv[..., 2][green], minlength=256))
+        median = int(np.searchsorted(value, 0.5 * value[-1]))
+        return median / 255.0 / self._parameters.reference_brightness, begins
 
     def _outline(self, classes: Mask, view: View) -> Array:
         """Return the carpet's upper edge: the hull of the tops of each column's lowest run of carpet.

@@ -88,6 +88,7 @@ def landmarks_of(field: Field) -> Landmarks:
     points: dict[FeatureClass, list[tuple[float, float]]] = {
         FeatureClass.GOAL_POST: [(post.x, post.y) for post in field.goal_posts],
         FeatureClass.PENALTY_MARK: list(field.penalty_marks),
+        FeatureClass.CENTRE_CIRCLE: [(field.centre_circle.x, field.centre_circle.y)],
     }
     for kind, crossing_kind in CROSSINGS.items():
         points[kind] = [(crossing.x, crossing.y) for crossing in field.crossings if crossing.kind is crossing_kind]

@@ -139,7 +139,7 @@ class Localization:
         observations: list[Observation] = []
         shown: list[Feature] = []
         for feature in features.features:
-            if feature.kind in (FeatureClass.BALL, FeatureClass.OPPONENT):
+            if feature.kind in (FeatureClass.BALL, FeatureClass.OPPONENT, FeatureClass.FIELD_BORDER):
                 continue
             observation, reason = self._observation(feature, features.camera_position)
             if observation is None:

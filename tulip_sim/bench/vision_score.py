@@ -22,8 +22,8 @@ Array = NDArray[np.float64]
 
 MATCH = math.radians(2.0)
 """A feature further than this from everything of its class, measured with the true camera pose, is false."""
-BODY_MATCH = 0.3
-"""[m] the same for opponents close by: what is on the body is not false, and of one seen in part the middle is not."""
+BODY_MATCH = 0.2
+"""[m] the same for opponents close by: two thirds of half a body's width."""
 LINE_STEP = 0.1  # [m] between the points at which a piece of line is judged
 FARTHEST_LINE = 5.0  # [m]
 LINE_LIMITS = (0.02, 0.05, 0.15)  # [m] points further off than the last are on no line
