@@ -26,6 +26,7 @@ from tulip_sim.bench import (
     head,
     ilc,
     kick,
+    latency,
     localization,
     odometry,
     push,
@@ -36,7 +37,7 @@ from tulip_sim.bench import (
 )
 from tulip_sim.bench.runner import Row, run, save, write_results
 
-MODULES = (trial, walk, push, kick, odometry, control, ilc, clik, stress, vision, localization, ball, head)
+MODULES = (trial, walk, push, kick, odometry, control, ilc, clik, stress, vision, localization, ball, head, latency)
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"
 

@@ -16,7 +16,7 @@ from tulip_msgs.msg import GameState as GameStateMessage
 from tulip_msgs.msg import ObjectEstimate as ObjectEstimateMessage
 from tulip_msgs.msg import UserCommand as UserCommandMessage
 from tulip_msgs.msg import WorldState as WorldStateMessage
-from tulip_ros.time import header, stamp_of
+from tulip_ros.time import from_message, header, stamp_of
 from tulip_strategy.interface import Decision, GamePhase, GameState, UserCommand, UserRequest
 from tulip_worldmodel.world_state import ObjectEstimate, RobotEstimate, WorldState
 
@@ -118,7 +118,8 @@ def world_state_from_message(message: WorldStateMessage) -> WorldState:
         pose_in_odom=Pose2D(*_three(message.robot_pose_in_odom)),
     )
     ball = _object(message.ball) if message.ball_known else None
-    return WorldState(stamp_of(message), robot, ball, tuple(_object(opponent) for opponent in message.opponents))
+    opponents = tuple(_object(opponent) for opponent in message.opponents)
+    return WorldState(stamp_of(message), robot, ball, opponents, from_message(message.picture))
 
 
 def _object(message: ObjectEstimateMessage) -> ObjectEstimate:

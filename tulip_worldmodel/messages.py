@@ -12,7 +12,7 @@ from tulip_description.frames import MAP, ODOM
 from tulip_msgs.msg import Features as FeaturesMessage
 from tulip_msgs.msg import ObjectEstimate as ObjectEstimateMessage
 from tulip_msgs.msg import WorldState as WorldStateMessage
-from tulip_ros.time import header, stamp_of
+from tulip_ros.time import header, stamp_of, to_message
 from tulip_vision.features import Feature, FeatureClass, Features
 from tulip_worldmodel.world_state import ObjectEstimate, WorldState
 
@@ -43,12 +43,15 @@ def features_from_message(message: FeaturesMessage) -> Features:
 def world_state_to_message(world: WorldState) -> WorldStateMessage:
     """Return a world state as a message."""
     message = WorldStateMessage(header=header(world.stamp, MAP))
+    message.picture = to_message(world.picture)
     message.robot_pose = world.robot.pose.as_array()
     message.robot_covariance = world.robot.covariance.ravel()
     message.robot_pose_in_odom = world.robot.pose_in_odom.as_array()
     message.ball_known = world.ball is not None
     if world.ball is not None:
         message.ball = object_to_message(world.ball)
+    if (rest := world.ball_rest) is not None:
+        message.ball_rest, message.ball_rest_after = rest.position, rest.after
     message.opponents = [object_to_message(opponent) for opponent in world.opponents]
     return message
 

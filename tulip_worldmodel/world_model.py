@@ -136,7 +136,7 @@ class WorldModel:
             _estimate(opponent.extrapolated(moved, here), robot, then.stamp, opponent.last_seen, opponent.confidence)
             for opponent in self._opponents.confirmed
         )
-        return WorldState(then.stamp, robot, ball, opponents)
+        return WorldState(then.stamp, robot, ball, opponents, self._last_picture or 0)
 
     def _advance(self, stamp: int) -> None:
         """Predict all filters along the path to a stamp."""

@@ -77,12 +77,14 @@ class WorldState:
         robot: The robot's own pose.
         ball: The ball, or None while it is not known.
         opponents: Confirmed opponents.
+        picture: Stamp of the newest picture whose features were used [ns]; 0 before the first.
     """
 
     stamp: int
     robot: RobotEstimate
     ball: ObjectEstimate | None
     opponents: tuple[ObjectEstimate, ...]
+    picture: int = 0
 
     @property
     def ball_rest(self) -> BallRest | None:

@@ -22,7 +22,6 @@ from tulip_worldmodel.messages import (
 )
 from tulip_worldmodel.rejected import Rejected
 from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
-from tulip_worldmodel.world_state import WorldState
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class WorldModelNodeParameters(WorldModelParameters):
     start_y: float = 0.0  # [m]
     start_yaw: float = 0.0  # [rad]
     field_file: str = ""  # "" for the AdultSize field of 2013
-    publish_period: float = 0.02  # [s] between two world states: strategy decides at most that often
+    publish_period: float = 0.02  # [s] between two world states without a new picture: one with news goes out at once
 
 
 class WorldModelNode(ComponentNode):
@@ -59,14 +58,15 @@ class WorldModelNode(ComponentNode):
             raise BadInputError(f"Parameter field_file of node 'worldmodel': {error}") from error
         self._world = WorldModel(p, field, Pose2D(p.start_x, p.start_y, p.start_yaw))
         self._last_published: int | None = None  # stamp [ns]
+        self._newest: int | None = None  # stamp of the newest odometry [ns]
 
     def _on_odometry(self, message: OdometryMessage) -> None:
         stamp = stamp_of(message)
         self._world.add_odometry(odometry_from_message(message))
         published = self._last_published
         if published is None or stamp - published >= self._settings.publish_period * 1e9:
-            self._last_published = stamp
-            self._publish(self._world.state(stamp))
+            self._publish(stamp)
+        self._newest = stamp
 
     def _on_features(self, message: FeaturesMessage) -> None:
         rejected = self._world.add_features(features_from_message(message))
@@ -74,8 +74,12 @@ class WorldModelNode(ComponentNode):
             if entry.feature is None:
                 self.health.count("pictures not used", f"picture not used: {entry.reason}")
             self.get_logger().debug(describe(entry))
+        if self._newest is not None:
+            self._publish(self._newest)
 
-    def _publish(self, world: WorldState) -> None:
+    def _publish(self, stamp: int) -> None:
+        self._last_published = stamp
+        world = self._world.state(stamp)
         self._world_state.publish(world_state_to_message(world))
         self._robot_pose.publish(robot_pose_to_message(world))
         self._transforms.publish(map_to_odom_message(world))

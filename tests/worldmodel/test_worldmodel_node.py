@@ -15,7 +15,7 @@ from tulip_msgs.msg import Feature as FeatureMessage
 from tulip_msgs.msg import Features as FeaturesMessage
 from tulip_ros import topics
 from tulip_ros.run import session
-from tulip_ros.time import header, stamp_of
+from tulip_ros.time import from_message, header, stamp_of
 from tulip_strategy.messages import world_state_from_message
 from tulip_vision.features import Features
 from tulip_worldmodel.messages import (
@@ -114,20 +114,22 @@ def collect(node: WorldModelNode, spin: Callable[[float], None], messages: list)
         expected = len(received["world_state"]) + 1
         sender.publish(message)
         for _ in range(200):
-            spin(0.05 if sender is odometry else 0.005)
-            if sender is features or len(received["world_state"]) >= expected:
+            spin(0.05)
+            if len(received["world_state"]) >= expected:
                 break
     for _ in range(20):
         spin(0.01)
     return received
 
 
-def test_node_publishes_the_state_of_the_core_on_its_three_topics(ros_domain: int) -> None:
+def test_node_publishes_the_state_of_the_core_with_each_input(ros_domain: int) -> None:
     messages, world = simulated(1.0)
     with session(WorldModelNode, arguments=["test"]) as (node, spin):
         received = collect(node, spin, messages)
-    odometry_count = sum(isinstance(message, OdometryMessage) for message in messages)
-    assert len(received["world_state"]) == len(received["robot_pose"]) == len(received["tf"]) == odometry_count
+    assert len(received["world_state"]) == len(received["robot_pose"]) == len(received["tf"]) == len(messages)
+    pictures = [stamp_of(message) for message in messages if isinstance(message, FeaturesMessage)]
+    told = [from_message(message.picture) for message in received["world_state"]]
+    assert sorted(set(told) - {0}) == pictures  # each as soon as its features have come
     last = received["world_state"][-1]
     assert stamp_of(last) == world.stamp
     assert last.robot_pose == pytest.approx(world.robot.pose.as_array(), abs=0.05)
