@@ -30,6 +30,7 @@ WATCHED = 8.0  # [s] that a resting ball is judged
 SEEN = 0.5  # [s] that a rolling ball has been seen when it is judged
 FARTHEST = 6.5  # [m] to which a rolling ball is followed
 LONGEST = 4.0  # [s] that it is followed
+BOUNCE = 0.15  # [m/s] that a ball's velocity changes between two looks when it meets something
 SLOW = 0.1  # [m/s] a ball slower than this has rolled
 RESEEN = 0.5  # [s] after a hidden ball is in view again, until it is judged
 LOST = 0.5  # [m] an estimate of a hidden ball that errs by more has lost it
@@ -95,13 +96,16 @@ def rolling(speed: float, walks: bool, seed: int, perception: str = "degraded") 
                 trial.step()
         trial.world.place_ball(*first, speed * math.cos(heading), speed * math.sin(heading))
         begin, seen = trial.stamp * 1e-9, 0.0
+        before = speed * np.array([math.cos(heading), math.sin(heading)])
         while trial.stamp * 1e-9 - begin < LONGEST:
             trial.go(trial.stamp * 1e-9 + LOOK)
             look = trial.compare()
             seen += LOOK * trial.ball_visible
-            inside = np.abs(trial.world.truth().ball_position[:2]) < (4.4, 3.5)  # before it meets goals and poles
-            if look.distance > FARTHEST or float(np.hypot(*look.velocity)) < SLOW or not inside.all():
+            way = trial.world.truth().ball_linear_velocity[:2]
+            met = np.linalg.norm(way - before) > BOUNCE  # a post, a pole or the robot
+            if look.distance > FARTHEST or float(np.hypot(*look.velocity)) < SLOW or met:
                 break
+            before = way
             looks.append((seen, look))
     finally:
         trial.close()
@@ -231,7 +235,8 @@ def _in_picture(trial: BallWalk, place: tuple[float, float]) -> bool:
     """Tell whether the head looks about towards a place (x, y) in map."""
     truth = trial.world.truth()
     x, y = truth.footprint.inverse().transform(place)
-    return abs(wrap_angle(float(truth.joint_positions[-2]) - math.atan2(y, x))) < 0.2
+    pan, tilt = truth.joint_positions[-2:].tolist()
+    return abs(wrap_angle(pan - math.atan2(y, x))) < 0.2 and tilt < 0.6  # the row that sees from 1 m on
 
 
 def _longest_gap(visible: list[bool]) -> tuple[int, int]:
