@@ -163,11 +163,15 @@ def find_penalty_marks(
     features: list[Feature] = []
     refusals: list[Refusal] = []
     rows, columns = mask.shape
+    focal = float(view.lens.camera_matrix[0, 0])
     for points, _ in patches(mask, LEAST_MARK_AREA, MOST_MARK_CANDIDATES):
         left, upper, width, height = cv2.boundingRect(points)
         cut = min(left, upper) <= 0 or left + width >= columns or upper + height >= rows
         if cut or len(points) < 6:
             continue
+        sine = float(view.middle_sines[upper + height // 2 + top])
+        if max(width, height) > 2.5 * parameters.mark_size * focal * -sine / view.height + 4.0:
+            continue  # a line, most often
         ground = view.ground(view.directions_at(points[:, 0], points[:, 1] + top))
         centre = 0.5 * (ground.max(axis=0) + ground.min(axis=0))
         extent = 2.0 * np.linalg.norm(ground - centre, axis=1).max()

@@ -19,7 +19,7 @@ from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
 from tulip_vision.patches import patches
 from tulip_vision.segmentation import Colour, Segmentation, belongs
-from tulip_vision.view import Array, View, angles, direction_of, fan_of
+from tulip_vision.view import Array, View, direction_of, fan_of
 
 MARKERS = {"cyan": (Colour.CYAN, Colour.MAGENTA), "magenta": (Colour.MAGENTA, Colour.CYAN)}
 """Own marker colour and the opponents', by the own team's colour."""
@@ -166,7 +166,7 @@ def _markers(found: list[tuple[NDArray[np.int32], float]], view: View) -> list[_
     lengths = [len(points) for points, _ in found]
     starts = np.concatenate([[0], np.cumsum(lengths)[:-1]])
     points = np.concatenate([points for points, _ in found])
-    azimuths, elevations = angles(view.directions_at(points[:, 0], points[:, 1]))
+    azimuths, elevations = view.angles_at(points)
     reference = np.repeat(azimuths[starts], lengths)
     turned = (azimuths - reference + math.pi) % (2.0 * math.pi) - math.pi + reference  # no jump behind the robot
     left, right = np.maximum.reduceat(turned, starts).tolist(), np.minimum.reduceat(turned, starts).tolist()

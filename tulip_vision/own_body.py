@@ -14,7 +14,7 @@ from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.robot import Robot
 from tulip_vision.view import Array, Mask, View
 
-STEP = 8  # [px] between the rays that are followed; the edges lie within the margin
+STEP = 16  # [px] between the rays that are followed; the edges lie within the margin
 MARGIN = 0.012  # [m] round each box: how far a trunk that leans by 3 deg moves an arm 0.2 m from the camera
 UNSEEN = ("neck", "head")  # carry the camera; it does not see them
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tulip_vision.patches import patches
 from tulip_vision.segmentation import Colour, Segmentation, belongs
-from tulip_vision.view import Array, Mask, View, angles, direction_of, directions_of
+from tulip_vision.view import Array, Mask, View, direction_of, directions_of
 
 MOST_CANDIDATES = 12
 """The largest patches are looked at; a crowd in yellow shirts must not cost time without bound."""
@@ -119,7 +119,7 @@ def _measure(contours: list[NDArray[np.int32]], segmentation: Segmentation, view
     """Return what each contour, (n, 2) pixels, is as an upright; what takes arrays is done for all at once."""
     points = np.concatenate(contours)
     starts = np.cumsum([0, *(len(each) for each in contours)])
-    azimuths, elevations = angles(view.directions_at(points[:, 0], points[:, 1]))
+    azimuths, elevations = view.angles_at(points)
     parts = [slice(first, last) for first, last in pairwise(starts.tolist())]
     shapes = [_shape(azimuths[part], elevations[part], view) for part in parts]
     azimuth, foot, high, pixel = np.array([[each.azimuth, each.foot, each.high, each.pixel] for each in shapes]).T[

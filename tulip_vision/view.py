@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tulip_vision.lens import Lens
+from tulip_vision.pixel_loops import angles_at, nearest_pixels
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
@@ -147,6 +148,11 @@ class View:
         seen: Array = self.lens.ray_table()[v, u].astype(np.float64) @ self.rotation.T
         return seen
 
+    def angles_at(self, pixels: NDArray[np.int32]) -> tuple[Array, Array]:
+        """Return azimuth and elevation (n,) seen at (n, 2) whole pixels inside the picture [rad]."""
+        seen: tuple[Array, Array] = angles_at(self.lens.ray_table(), self.rotation, pixels)
+        return seen
+
     def ground(self, directions: Array) -> Array:
         """Return where directions meet the ground.
 
@@ -214,13 +220,12 @@ class View:
         self, images: tuple[NDArray[Any], ...], pixels: Array
     ) -> tuple[list[NDArray[Any]], NDArray[np.bool_]]:
         """Read several images at the same (n, 2) pixels, as `sample` does one."""
-        inside = self.inside(pixels)
-        whole = bool(inside.all())
-        # Half a pixel is added and cut off: that rounds, as no pixel inside is negative.
-        u, v = ((pixels if whole else np.where(inside[:, None], pixels, 0.0)) + 0.5).astype(np.intp).T
-        index = v * self.lens.width + u
+        index, inside = nearest_pixels(pixels, self.lens.width, self.lens.height)
         read = [image.reshape(-1)[index] for image in images]
-        return read if whole else [np.where(inside, values, 0) for values in read], inside
+        if not inside.all():
+            for values in read:
+                values[~inside] = 0
+        return read, inside
 
     def coverage(self) -> Array:
         """Return (4,) azimuth of left and right edge, elevation of lower and upper edge, at the middle [rad]."""

@@ -76,7 +76,7 @@ class Tally:
         )
 
 
-RANGES = {"ball": 6.0, "post": 9.0, "pole": 7.0, "opponent": 8.0, "crossing": 5.0, "mark": 3.0}
+RANGES = {"ball": 6.0, "post": 9.0, "pole": 7.0, "opponent": 8.0, "crossing": 5.0, "mark": 3.0, "circle": 4.0}
 """[m] up to here a thing must be found."""
 MATCH = math.radians(2.0)
 """A feature further than this from everything of its class is false."""

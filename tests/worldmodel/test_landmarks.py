@@ -109,6 +109,7 @@ def test_field_gives_its_landmarks_by_class() -> None:
     assert counts == {
         FeatureClass.GOAL_POST: 4,
         FeatureClass.PENALTY_MARK: 2,
+        FeatureClass.CENTRE_CIRCLE: 1,
         FeatureClass.CROSSING_L: 8,
         FeatureClass.CROSSING_T: 6,
         FeatureClass.CROSSING_X: 2,

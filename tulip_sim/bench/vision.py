@@ -12,7 +12,7 @@ from tulip_description.field import load_field
 from tulip_description.robot import load_robot
 from tulip_sim.bench.runner import Bench, Row
 from tulip_sim.bench.vision_picture import draw_scenes
-from tulip_sim.bench.vision_real import measure_real, real_table
+from tulip_sim.bench.vision_real import draw_real, measure_real, real_table
 from tulip_sim.bench.vision_score import LINE_LIMITS, Judge
 from tulip_sim.bench.vision_shots import shots, vision_of
 from tulip_sim.bench.vision_speed import measure_speed, speed_table
@@ -31,6 +31,7 @@ def measure_scenes(seed: int) -> Row:
     judge = Judge(lens, load_field(), load_robot())
     sightings: list[str] = []
     lines = {"believed": [np.empty(0)], "own": [np.empty(0)]}
+    border = [np.empty(0)]
     pictures, brightness = 0, 0.0
     vision: Vision | None = None
     for shot in shots(seed):
@@ -40,11 +41,14 @@ def measure_scenes(seed: int) -> Row:
         errors = judge.line_errors(shot, features)
         lines["believed"].append(errors.believed)
         lines["own"].append(errors.own)
+        border.append(judge.border_errors(shot, features))
         pictures, brightness = pictures + 1, shot.camera.brightness
     row: Row = {"part": "scenes", "seed": seed, "pictures": pictures, "brightness": round(brightness, 3)}
     for name, parts in lines.items():
         values = np.concatenate(parts)
         row[f"line points, {name}"] = [len(values), *(int((values < limit).sum()) for limit in LINE_LIMITS)]
+    values = np.concatenate(border)
+    row["border points"] = [len(values), *(int((values < limit).sum()) for limit in LINE_LIMITS)]
     return {**row, "sightings": sightings}
 
 
@@ -69,8 +73,9 @@ def summarize(rows: list[Row]) -> list[str]:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Draw good and bad pictures of the scenes."""
+    """Draw good and bad pictures of the scenes, and beside that picture one of the real pictures."""
     draw_scenes(_part(rows, "scenes"), path)
+    draw_real(path.with_name(f"{path.stem}_real.png"))
 
 
 def _part(rows: Sequence[Row], part: str) -> list[Row]:

@@ -12,7 +12,7 @@ from tulip_description.field import Field
 from tulip_description.planar import wrap_angle
 from tulip_description.robot import Robot
 from tulip_sim.bench.vision_shots import Shot
-from tulip_sim.bench.vision_truth import GROUPS, Thing, line_distances, things
+from tulip_sim.bench.vision_truth import GROUPS, Thing, border_distances, line_distances, things
 from tulip_sim.scene import Body, scene_of
 from tulip_vision.features import Feature, FeatureClass, Features
 from tulip_vision.lens import Lens
@@ -118,10 +118,20 @@ class Judge:
 
     def line_errors(self, shot: Shot, features: Features) -> LineErrors:
         """Return how far the pieces of line of a picture are from the field's lines."""
-        believed: list[Array] = [np.empty(0)]
-        own: list[Array] = [np.empty(0)]
+        believed, own = self._places(shot, features, FeatureClass.LINE)
+        return LineErrors(line_distances(believed, self._field), line_distances(own, self._field))
+
+    def border_errors(self, shot: Shot, features: Features) -> Array:
+        """Return how far points of the field's border in a picture are from it, camera pose as believed, (n,) [m]."""
+        believed, _ = self._places(shot, features, FeatureClass.FIELD_BORDER)
+        return border_distances(believed, self._field)
+
+    def _places(self, shot: Shot, features: Features, kind: FeatureClass) -> tuple[Array, Array]:
+        """Return points along straight features up to FARTHEST_LINE away, with both camera poses, (n, 2) in map [m]."""
+        believed: list[Array] = [np.empty((0, 2))]
+        own: list[Array] = [np.empty((0, 2))]
         for feature in features.features:
-            if feature.kind != FeatureClass.LINE:
+            if feature.kind != kind:
                 continue
             ends = np.stack(
                 [
@@ -135,10 +145,10 @@ class Judge:
             points = points[np.hypot(*(points - features.camera_position[:2]).T) < FARTHEST_LINE]
             rays = np.column_stack([points, np.zeros(len(points))]) - features.camera_position
             truly = _on_ground(_turned(rays, shot), shot.true[:3, 3])
-            for places, errors in ((points, believed), (truly, own)):
+            for places, found in ((points, believed), (truly, own)):
                 in_map = [shot.truth.footprint.transform((x, y)) for x, y in places.tolist()]
-                errors.append(line_distances(np.array(in_map).reshape(-1, 2), self._field))
-        return LineErrors(np.concatenate(believed), np.concatenate(own))
+                found.append(np.array(in_map).reshape(-1, 2))
+        return np.concatenate(believed), np.concatenate(own)
 
     def _compare(
         self, name: str, present: list[Thing], found: list[Feature], shot: Shot, number: int, features: Features

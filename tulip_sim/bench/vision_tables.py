@@ -13,7 +13,7 @@ from tulip_sim.bench.vision_score import LINE_LIMITS, Sighting
 
 Array = NDArray[np.float64]
 
-RANGES = {"ball": 8.0, "post": 9.0, "pole": 7.0, "opponent": 8.0, "crossing": 5.0, "mark": 3.0}
+RANGES = {"ball": 8.0, "post": 9.0, "pole": 7.0, "opponent": 8.0, "crossing": 5.0, "mark": 3.0, "circle": 4.0}
 """[m] along the ground, up to which a thing that is seen whole has to be found."""
 NEAR_BALL, RANGED_BALL = 6.0, 4.5  # [m]
 MOVEMENTS = {"stand": "standing", "walk": "walking", "sweep": "walking, head sweeping"}
@@ -114,6 +114,12 @@ def scenes_table(rows: Sequence[Row]) -> list[str]:
     partly = [each for each in all_seen if each.state == "partly" and each.distance <= RANGES["ball"]]
     found = sum(each.found for each in partly)
     lines += ["", f"Balls of which 40 to 90 % are seen: {found} of {len(partly)} found."]
+    counts = np.sum([row["border points"] for row in rows], axis=0)
+    shares = ", ".join(
+        f"{count / max(counts[0], 1):.1%} within {100 * limit:g} cm"
+        for count, limit in zip(counts[1:], LINE_LIMITS, strict=True)
+    )
+    lines += ["", f"Points of the field's border to 5 m ({counts[0]}), camera pose as the robot knew it: {shares}."]
     return lines
 
 

@@ -24,6 +24,7 @@ GROUPS: dict[str, tuple[FeatureClass, ...]] = {
     "opponent": (FeatureClass.OPPONENT,),
     "crossing": (FeatureClass.CROSSING_L, FeatureClass.CROSSING_T, FeatureClass.CROSSING_X),
     "mark": (FeatureClass.PENALTY_MARK,),
+    "circle": (FeatureClass.CENTRE_CIRCLE,),
 }
 """Classes of features, by the names that are used for things here."""
 
@@ -165,7 +166,19 @@ def things(truth: Truth, body: Boxes, field: Field, view: View) -> dict[str, lis
         point = np.array([*mark, 0.0])
         ring = np.concatenate([point[None], point + 0.2 * AROUND])
         add("mark", GROUPS["mark"], point, bool(seen(ring, "", 2.0).all()))
+    circle = field.centre_circle
+    middle = np.array([circle.x, circle.y, 0.0])
+    add("circle", GROUPS["circle"], middle, float(seen(middle + circle.radius * AROUND, "", 4.0).mean()) >= WHOLE)
     return found
+
+
+def border_distances(points: Array, field: Field) -> Array:
+    """Return how far points on the ground, (n, 2) in map [m], are from the carpet's edge, (n,) [m]."""
+    half = np.array([field.carpet_length, field.carpet_width]) / 2.0
+    beyond = np.abs(points) - half  # negative inside
+    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+    edges: Array = np.where((beyond < 0.0).all(axis=1), -beyond.max(axis=1), outside)
+    return edges
 
 
 def line_distances(points: Array, field: Field) -> Array:
