@@ -89,7 +89,7 @@ class Localization:
     @property
     def covariance(self) -> Array:
         """(3, 3) of x [m], y [m], yaw [rad] in map about `pose`, of all hypotheses together."""
-        return self._mixed([(each.filter.pose, each.filter.covariance) for each in self._hypotheses])
+        return self._stated([(each.filter.pose, each.filter.covariance) for each in self._hypotheses])
 
     @property
     def camera_error(self) -> Array:
@@ -123,7 +123,7 @@ class Localization:
     def predicted(self, moved: Increment) -> tuple[Pose2D, Array]:
         """Return pose and (3, 3) covariance after a movement, without changing the filter."""
         moments = [each.filter.predicted(moved) for each in self._hypotheses]
-        return moments[0][0], self._mixed(moments)
+        return moments[0][0], self._stated(moments)
 
     def update(self, features: Features, since_last: float) -> tuple[Rejected, ...]:
         """Correct the pose with one picture, taken where the robot is now predicted to be.
@@ -207,6 +207,10 @@ class Localization:
         if certain and best.filter.detector.evidence == 0.0:
             kept, best.log_weight = [best], 0.0
         self._hypotheses = kept
+
+    def _stated(self, moments: list[tuple[Pose2D, Array]]) -> Array:
+        """Return the (3, 3) covariance of a mixture, with what stays the same from picture to picture."""
+        return self._mixed(moments) + np.diag([self._parameters.systematic_spread**2] * 2 + [0.0])
 
     def _mixed(self, moments: list[tuple[Pose2D, Array]]) -> Array:
         """Return the (3, 3) covariance of a mixture about its first pose: sum of w (P + d d^T)."""

@@ -26,6 +26,8 @@ class LocalizationParameters:
     noise_scale_rate: float = 0.01  # by which a feature changes the factor on vision's spreads: 4 s to the threefold
     greatest_noise_scale: float = 4.0  # vision is not taken to be worse than so many times what it says
     landmark_spread: float = 0.01  # [m] which edge of a line or post is seen; 0.03 on a field painted by hand
+    systematic_spread: float = 0.003  # [m] of x and y, that no number of pictures removes: a mount that is 5 mm too low
+    # or a field 0.4 % too long moves the pose by that share of the range, otherwise at each place
     longest_range: float = 8.0  # [m] features further away on the ground are not used
     shortest_line: float = 0.5  # [m] shorter pieces may belong to the centre circle
     false_rate_crossing: float = 0.15  # one in seven, measured

@@ -38,9 +38,11 @@ def nothing(stamp: int) -> Features:
 
 def test_before_any_input_the_state_is_the_start_with_its_uncertainty() -> None:
     start = Pose2D(-2.0, 1.0, 0.5)
-    state = WorldModel(WorldModelParameters(), FIELD, start).state(5)
+    parameters = WorldModelParameters()
+    state = WorldModel(parameters, FIELD, start).state(5)
     assert state.robot.pose == start
-    assert np.sqrt(np.diag(state.robot.covariance)) == pytest.approx([0.3, 0.3, math.radians(10.0)])
+    position = math.hypot(0.3, parameters.localization.systematic_spread)
+    assert np.sqrt(np.diag(state.robot.covariance)) == pytest.approx([position, position, math.radians(10.0)])
     assert state.ball is None
     assert state.opponents == ()
 
