@@ -21,6 +21,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_vision.pixel_loops import project_plumb_bob
+
 Array = NDArray[np.float64]
 
 PLUMB_BOB = "plumb_bob"
@@ -33,6 +35,7 @@ COEFFICIENTS = {PLUMB_BOB: (4, 5, 8), EQUIDISTANT: (4,), EQUISOLID: (0, 4), RECT
 STEEPEST = math.radians(88.0)  # where a tangent is still a length that a picture can have: 29 focal lengths
 STEP = math.radians(0.1)  # of the tables; Newton's method needs no finer start
 NEWTON_STEPS = 12
+PLAIN = np.array([1.0, 1.0, 0.0, 0.0])  # scale of the image plane itself
 CONVERGED = 1e-13  # [focal lengths] rounding is all that remains
 
 
@@ -59,13 +62,9 @@ class PlumbBob:
     """The pinhole with radial and tangential distortion."""
 
     def __init__(self, coefficients: Array) -> None:
-        self._k1, self._k2, self._p1, self._p2, self._k3, self._k4, self._k5, self._k6 = [
-            *coefficients.tolist(),
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        ][:8]
+        self._coefficients = np.zeros(8)
+        self._coefficients[: coefficients.size] = coefficients
+        self._k1, self._k2, self._p1, self._p2, self._k3, self._k4, self._k5, self._k6 = self._coefficients.tolist()
         tangents = np.tan(np.arange(0.0, STEEPEST, STEP))
         radii = tangents * self._stretch(tangents**2)
         way = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
@@ -77,13 +76,7 @@ class PlumbBob:
 
     def flatten(self, directions: Array) -> Array:
         """Return (n, 2) points of the image plane of (n, 3) directions."""
-        x, y = directions[:, 0] / directions[:, 2], directions[:, 1] / directions[:, 2]
-        xx, yy, xy = x * x, y * y, 2.0 * x * y
-        squared = xx + yy
-        radial = self._stretch(squared)
-        points = np.empty((len(directions), 2))
-        points[:, 0] = x * radial + self._p1 * xy + self._p2 * (squared + 2.0 * xx)
-        points[:, 1] = y * radial + self._p1 * (squared + 2.0 * yy) + self._p2 * xy
+        points: Array = project_plumb_bob(directions, self._coefficients, PLAIN, math.inf)
         return points
 
     def unflatten(self, points: Array) -> Array:
