@@ -27,6 +27,7 @@ from tulip_description.camera_mount import LARGEST_ANGLE, LARGEST_HEIGHT, OFFSET
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.field import Field
 from tulip_description.planar import Pose2D
+from tulip_description.quaternion import quaternion_yaw
 from tulip_description.robot import Robot
 from tulip_vision.calibration.field_lines import FieldLines
 from tulip_vision.calibration.recording import Shot
@@ -161,7 +162,7 @@ class MountCalibration:
             robot: Whose camera it is.
             field: Whose lines are seen.
             lens: Of the camera.
-            place: Where base_footprint stood in map.
+            place: Where base_footprint stood in map at the first picture.
             shots: How the head was held for each picture.
             start: The offsets as known before.
             names: Which of them are to be found.
@@ -180,6 +181,7 @@ class MountCalibration:
         self._robot, self._lens, self._place, self._shots = robot, lens, place, tuple(shots)
         self._start, self._names, prior = start, tuple(names), prior or PriorParameters()
         self._lines = FieldLines(field)
+        self._first_heading = quaternion_yaw(shots[0].base_orientation)
         self._body = prior.body
         self._prior = np.array([prior.place, prior.place, prior.heading, prior.attitude, prior.attitude])
 
@@ -189,14 +191,15 @@ class MountCalibration:
         Args:
             shot: How the head was held.
             mount: How the camera sits.
-            place: Where the robot stands.
+            place: Where the robot stood at the first picture; soles creep, and so it may have turned on the spot since.
             lean: (2,) error of the trunk's roll and pitch, about its own axes [rad].
         """
         turn = np.asarray(shot.base_orientation)
         if lean is not None:
             turn = (Rotation.from_quat(turn) * Rotation.from_rotvec([lean[0], lean[1], 0.0])).as_quat()
         camera = camera_in_footprint(self._robot, shot.base_height, turn, shot.pan, shot.tilt, mount)
-        c, s = math.cos(place.yaw), math.sin(place.yaw)
+        yaw = place.yaw + quaternion_yaw(shot.base_orientation) - self._first_heading
+        c, s = math.cos(yaw), math.sin(yaw)
         footprint = np.array([[c, -s, 0.0, place.x], [s, c, 0.0, place.y], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
         return footprint @ camera
 

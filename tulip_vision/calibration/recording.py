@@ -8,7 +8,7 @@ recording.yaml beside the pictures and the lens file lens.yaml:
       pan: 0.1                                    # [rad] measured
       tilt: 0.3
       base_height: 0.93                           # [m] of base_link above the ground
-      base_orientation: [0.0, 0.0, 0.0, 1.0]      # x, y, z, w by IMU and legs; its yaw does not matter
+      base_orientation: [0.0, 0.0, 0.0, 1.0]      # x, y, z, w by IMU and legs; its yaw counts from that of the first picture
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Shot:
         picture: Name of the file in the folder.
         pan, tilt: Measured angles of the head's joints [rad].
         base_height: Of base_link above the ground [m].
-        base_orientation: x, y, z, w of base_link in any level frame.
+        base_orientation: x, y, z, w of base_link in any level frame; its yaw counts from that of the first picture.
     """
 
     picture: str
