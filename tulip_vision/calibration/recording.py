@@ -8,7 +8,7 @@ recording.yaml beside the pictures and the lens file lens.yaml:
       pan: 0.1                                    # [rad] measured
       tilt: 0.3
       base_height: 0.93                           # [m] of base_link above the ground
-      base_orientation: [0.0, 0.0, 0.0, 1.0]      # x, y, z, w by IMU and legs; its yaw counts from that of the first picture
+      base_orientation: [0.0, 0.0, 0.0, 1.0]      # x, y, z, w by IMU and legs; yaw as in odom
 """
 
 from __future__ import annotations
