@@ -83,6 +83,10 @@ class OwnEyes:
         self._vision = Vision(parameters.vision, lens, OwnBody(robot))
         self._rng = np.random.default_rng([parameters.seed, 1])
 
+    def rehearse(self) -> None:
+        """Load vision's compiled loops before the first picture."""
+        self._vision.rehearse()
+
     def expose(self, truth: Truth) -> None:
         """Take a picture of what is."""
         self._picture = self._camera.render(truth, self._rng)
@@ -176,6 +180,7 @@ class EyesBeside:
 def _serve(pipe: Connection, parameters: EyesParameters) -> None:
     cv2.setNumThreads(1)
     eyes = OwnEyes(parameters)
+    eyes.rehearse()
     try:
         pipe.send("ready")
         while True:

@@ -16,6 +16,7 @@ from tulip_ros import topics
 from tulip_ros.errors import BadInputError
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.time import stamp_of
+from tulip_vision.lens import head_camera_lens
 from tulip_vision.messages import features_to_message, lens_from_message, picture_from_message, picture_to_message
 from tulip_vision.own_body import OwnBody
 from tulip_vision.pipeline import Vision, VisionParameters
@@ -44,6 +45,7 @@ class VisionNode(ComponentNode):
         except MountFileError as error:
             raise BadInputError(str(error)) from None
         self._vision: Vision | None = None
+        Vision(self._settings, head_camera_lens(), self._own_body).rehearse()
         self.begin_anew()
         self._features = self.sender(topics.FEATURES)
         self._drawn = self.sender(topics.VISION_PICTURE)

@@ -92,6 +92,17 @@ def test_the_same_picture_gives_the_same_features_whatever_came_before() -> None
     assert repr(first.features) == repr(second.features)
 
 
+def test_rehearsing_leaves_no_trace() -> None:
+    picture = np.full((480, 640, 3), CARPET, np.uint8)
+    picture[300:310] = 230
+    fresh, rehearsed = (Vision(VisionParameters(), head_camera_lens()) for _ in range(2))
+    rehearsed.rehearse()
+    assert rehearsed.last is None
+    first, second = (vision.process(picture, 5, POSE) for vision in (fresh, rehearsed))
+    assert len(first.features) > 0
+    assert repr(first.features) == repr(second.features)
+
+
 def test_annotating_another_picture_is_refused() -> None:
     picture = np.full((480, 640, 3), CARPET, np.uint8)
     vision = Vision(VisionParameters(), head_camera_lens())
