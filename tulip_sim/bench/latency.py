@@ -25,7 +25,7 @@ from tulip_sim.bench.runner import Bench, Row
 from tulip_sim.match_graph import SILENCE, TrialWatcher, trial_plan
 
 SEEDS = (1, 2, 3)
-WATCHED = 40.0  # [s] of simulated time from when the robot plays; less if a goal comes first
+WATCHED = 40.0  # [s] of simulated time that the robot plays, all nodes being up; less if a goal comes first
 BAR = 50.0  # [ms]
 BINS = np.arange(0.0, 120.0, 2.5)  # [ms]
 
@@ -54,7 +54,8 @@ class LatencyWatcher(TrialWatcher):
 
     def _on_news(self, message: WorldState) -> None:
         now, picture = time.monotonic(), from_message(message.picture)
-        if picture == self._picture or not self._stamps:
+        plays = self.truth is not None and self.truth.trial_time > 0.0
+        if picture == self._picture or not self._stamps or not plays:
             return
         self._picture = picture
         exposed = bisect.bisect_left(self._stamps, picture)  # joints are read every 4 ms, the shutter at one of them
@@ -92,8 +93,9 @@ def measure(seed: int) -> Row:
 def summarize(rows: list[Row]) -> list[str]:
     """Return one line a trial."""
     lines = [
-        "From the shutter to the first world state that knows the picture, by the wall clock; the whole graph on this"
-        f" machine's cores, pictures of 640x480 at 15 Hz. Asked for: 99 of 100 within {BAR:.0f} ms.",
+        "From the shutter to the first world state that knows the picture, by the wall clock, while the robot plays; the"
+        " whole graph on this machine's cores, pictures of 640x480 at 15 Hz. Asked for: 99 of 100 within"
+        f" {BAR:.0f} ms.",
         "",
         "| seed | pictures | median | p99 | most | real-time factor |",
         "| --- | --- | --- | --- | --- | --- |",
