@@ -93,8 +93,8 @@ def measure(seed: int) -> Row:
 def summarize(rows: list[Row]) -> list[str]:
     """Return one line a trial."""
     lines = [
-        "From the shutter to the first world state that knows the picture, by the wall clock, while the robot plays; the"
-        " whole graph on this machine's cores, pictures of 640x480 at 15 Hz. Asked for: 99 of 100 within"
+        "From the shutter to the first world state that knows the picture, by the wall clock, while the robot plays;"
+        " the whole graph on this machine's cores, pictures of 640x480 at 15 Hz. Asked for: 99 of 100 within"
         f" {BAR:.0f} ms.",
         "",
         "| seed | pictures | median | p99 | most | real-time factor |",
