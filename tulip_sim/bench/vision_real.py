@@ -253,6 +253,7 @@ def draw_real(path: Path) -> None:
         entries = [entry for entry in manifest() if "lens" in entry["annotation"]]
     except OSError:
         return
+    path.parent.mkdir(parents=True, exist_ok=True)
     whole, close = [], []
     for entry in entries:
         lens, pose = known_lens(entry)
