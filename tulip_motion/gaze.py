@@ -13,12 +13,13 @@ becomes less sure, and looking at landmarks more valuable; and the other way rou
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tulip_description.field import Field
+from tulip_description.positive import check_positive
 from tulip_description.robot import Robot
 from tulip_motion.gaze_landmarks import Landmarks, Sight, ball_after_look, pose_after_look
 from tulip_motion.head import HeadParameters
@@ -74,10 +75,7 @@ class GazeParameters:
         Raises:
             ValueError: if one is out of range.
         """
-        for entry in fields(GazeParameters):
-            value = getattr(self, entry.name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{entry.name} is {value}; expected a finite value > 0")
+        check_positive(self, GazeParameters)
         if self.gaze_found > 1.0:
             raise ValueError(f"gaze_found is {self.gaze_found}; expected a share <= 1")
         if self.gaze_farthest_tilt >= self.gaze_nearest_tilt:

@@ -5,12 +5,12 @@ Each mode chooses where the two joints shall be; one trajectory with limited spe
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_description.positive import check_positive
 from tulip_description.robot import HEAD_JOINTS, Robot
 from tulip_description.robot_io import JointCommand
 from tulip_motion.head_geometry import HeadGeometry
@@ -50,10 +50,7 @@ class HeadParameters:
         Raises:
             ValueError: if one is out of range.
         """
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{entry.name} is {value}; expected a finite value > 0")
+        check_positive(self)
         if self.search_tilt_near <= self.search_tilt_far:
             raise ValueError(
                 f"search_tilt_near is {self.search_tilt_near} rad; expected more than search_tilt_far,"

@@ -12,11 +12,12 @@ by it. Here it is taken out again, so that nothing is counted twice.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_description.positive import check_positive
 from tulip_vision.features import Feature
 from tulip_vision.view import SpreadParameters
 
@@ -40,10 +41,7 @@ class CameraErrorParameters:
         Raises:
             ValueError: if one is out of range.
         """
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{entry.name} is {value}; expected a finite value > 0")
+        check_positive(self)
 
     @property
     def variances(self) -> Array:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+
+from tulip_description.positive import check_positive
 
 
 @dataclass(frozen=True)
@@ -59,10 +61,7 @@ class LocalizationParameters:
         Raises:
             ValueError: if one is out of range.
         """
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{entry.name} is {value}; expected a finite value > 0")
+        check_positive(self)
         for name in (
             "false_rate_crossing",
             "false_rate_other",

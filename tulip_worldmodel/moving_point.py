@@ -6,14 +6,14 @@ With it, successive pictures tell precisely how the point moves, and still not w
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
+from tulip_description.positive import check_positive
 from tulip_worldmodel.camera_error import CameraErrorParameters
 from tulip_worldmodel.mahalanobis import distances_and_determinants
 from tulip_worldmodel.rolling import Slowing
@@ -34,10 +34,7 @@ def check_tracking(parameters: Any) -> None:
     Raises:
         ValueError: if one is out of range.
     """
-    for entry in fields(parameters):
-        value = getattr(parameters, entry.name)
-        if not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{entry.name} is {value}; expected a finite value > 0")
+    check_positive(parameters)
     for name in ("gate_probability", "confidence_gain", "confirmed", "forgotten"):
         if getattr(parameters, name) >= 1.0:
             raise ValueError(f"{name} is {getattr(parameters, name)}; expected < 1")
