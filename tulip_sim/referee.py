@@ -1,4 +1,4 @@
-"""The referee of a dribble-and-kick trial: judges from the ground truth and writes version 7 packets."""
+"""The referee of a dribble-and-kick trial: judges from the ground truth."""
 
 from __future__ import annotations
 
@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from enum import Enum
 
 from tulip_description.field import Field, Goal
+from tulip_sim.referee_packets import PLAYERS, write_packet
+from tulip_sim.situation import PlayerSituation, Removal, Situation, TeamSituation
 from tulip_sim.truth import Truth
-from tulip_strategy.game_controller import Packet, Player, Team, TeamColour, encode
+from tulip_strategy.game_controller import TeamColour
 from tulip_strategy.interface import GamePhase
 
 SECOND = 10**9  # [ns]
-PLAYERS = (11, 10)  # of the two teams in a packet of version 7
-PENALTY_SHOOT = 1  # secondary state: the nearest that version 7 has to dribble and kick
-YELLOW_GOAL = 1
-MOST_PENALTY_SHOTS = 5  # trials a side, one bit each
 
 
 @dataclass(frozen=True)
@@ -98,8 +96,8 @@ class Referee:
         self._parameters = parameters
         self._field = field
         self._score = [0, 0]
-        self._shots = 0
-        self._trials = 0
+        self._scored: list[bool] = []
+        self._packets = 0
         self._begin: int | None = None
         self.restart()
 
@@ -114,7 +112,7 @@ class Referee:
         self._falls = 0
         self._was_out = False
         self._outs = 0
-        self._penalty: tuple[int, int] | None = None
+        self._penalty: tuple[Removal, int] | None = None
 
     @property
     def outcome(self) -> Outcome | None:
@@ -163,9 +161,9 @@ class Referee:
         """Time since the beginning of play [s]; what it was at the end once the trial is over."""
         return self._outcome.seconds if self._outcome is not None else self._playing_time()
 
-    def penalise(self, penalty: int, seconds: float) -> None:
-        """Penalise the striker for a time [s]; penalty 0 ends a penalty."""
-        self._penalty = None if penalty == 0 else (penalty, self._now + round(seconds * SECOND))
+    def remove(self, reason: Removal, seconds: float) -> None:
+        """Take the striker out of play for a time [s]; `Removal.NONE` sets it back in."""
+        self._penalty = None if reason is Removal.NONE else (reason, self._now + round(seconds * SECOND))
 
     def update(self, truth: Truth) -> bytes | None:
         """Judge what is, and return the packet that is due, if one is."""
@@ -182,37 +180,30 @@ class Referee:
         self._told = self.phase
         while self._next_packet <= self._now:
             self._next_packet += round(self._parameters.packet_period * SECOND)
-        return self.packet()
+        packet = write_packet(self.situation())
+        self._packets += 1
+        return packet
 
-    def packet(self) -> bytes:
-        """Return the packet for the present state."""
+    def situation(self) -> Situation:
+        """Return the game as it is now."""
         parameters = self._parameters
         own = TeamColour(parameters.team_colour)
         other = TeamColour.CYAN if own is TeamColour.MAGENTA else TeamColour.MAGENTA
-        players = [Player()] * PLAYERS[0]
+        players = [PlayerSituation()] * parameters.player_number
         if self._penalty is not None:
-            code, until = self._penalty
-            players[parameters.player_number - 1] = Player(code, math.ceil((until - self._now) / SECOND))
-        return encode(
-            Packet(
-                version=7,
-                players_per_team=1,
-                state=self.phase,
-                first_half=1,
-                kick_off=own,
-                secondary_state=PENALTY_SHOOT,
-                drop_in_team=own,
-                drop_in_time=-1,
-                seconds_remaining=math.ceil(parameters.playing_time - self.played),
-                teams=(
-                    Team(parameters.team_number, own, YELLOW_GOAL, self._score[0] & 0xFF, tuple(players)),
-                    Team(
-                        parameters.opponent_number, other, YELLOW_GOAL, self._score[1] & 0xFF, (Player(),) * PLAYERS[1]
-                    ),
-                ),
-                penalty_shots=(self._shots & 0xFF, 0),
-                sub_time=math.ceil(self._phase_left()),
-            )
+            reason, until = self._penalty
+            players[-1] = PlayerSituation(reason, math.ceil((until - self._now) / SECOND))
+        return Situation(
+            phase=self.phase,
+            first_half=True,
+            striker=0,
+            seconds_remaining=math.ceil(parameters.playing_time - self.played),
+            phase_seconds=math.ceil(self._phase_left()),
+            teams=(
+                TeamSituation(parameters.team_number, own, self._score[0], tuple(players), tuple(self._scored)),
+                TeamSituation(parameters.opponent_number, other, self._score[1], (PlayerSituation(),)),
+            ),
+            packet_number=self._packets,
         )
 
     def _elapsed(self) -> float:
@@ -246,7 +237,6 @@ class Referee:
         lying = self._lying_since is not None and truth.stamp - self._lying_since
         if self._in_goal(truth, self._field.opponent_goal):
             self._score[0] += 1
-            self._shots |= 1 << min(self._trials, MOST_PENALTY_SHOTS - 1)
             self._end(Result.GOAL, truth)
         elif self._in_goal(truth, self._field.own_goal):
             self._score[1] += 1
@@ -283,4 +273,4 @@ class Referee:
             truth.keeper_touches,
             self._falls,
         )
-        self._trials += 1
+        self._scored.append(result is Result.GOAL)

@@ -10,6 +10,8 @@ import pytest
 from tulip_description.field import load_field
 from tulip_description.planar import Pose2D
 from tulip_sim.referee import Referee, RefereeParameters, Result
+from tulip_sim.referee_packets import write_packet
+from tulip_sim.situation import Removal
 from tulip_sim.truth import Truth
 from tulip_strategy.game_controller import Packet, decode
 from tulip_strategy.game_input import GameInput, GameInputParameters
@@ -58,7 +60,7 @@ def playing(parameters: RefereeParameters | None = None) -> Referee:
 
 
 def packet_of(referee: Referee) -> Packet:
-    packet = decode(referee.packet())
+    packet = decode(write_packet(referee.situation()))
     assert isinstance(packet, Packet)
     return packet
 
@@ -179,7 +181,7 @@ def test_a_robot_lying_for_30_s_ends_the_trial_and_one_that_gets_up_does_not() -
 
 def test_a_penalty_is_in_the_packets_until_its_time_is_over() -> None:
     referee = playing(RefereeParameters(player_number=2))
-    referee.penalise(5, 30.0)
+    referee.remove(Removal.INACTIVE, 30.0)
     player = packet_of(referee).teams[0].players[1]
     assert (player.penalty, player.seconds) == (5, 30)
     referee.update(truth(START + 29.5))
