@@ -11,21 +11,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tulip_description.field import CrossingKind, Field
+from tulip_description.field import CrossingKind, Field, Goal
 from tulip_description.robot import LEG_JOINTS, Robot
 from tulip_sim.camera import CameraParameters, draw_mount
 from tulip_sim.occlusion import Solids
 from tulip_sim.scene import Body, scene_of
 from tulip_sim.truth import Truth
 from tulip_vision.features import Feature, FeatureClass, Features
+from tulip_vision.goal_frames import BESIDE, LEAST_SEEN, LEFT, RIGHT
 from tulip_vision.lens import Lens
 from tulip_vision.view import SpreadParameters, View
+from tulip_worldmodel.landmarks import has_side
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -112,12 +114,14 @@ class Glimpse:
         rays: (1, 3) unit direction, or (2, 3) of both ends of a line.
         footed: Whether the foot, and with it the elevation, is seen.
         angular_radius: Of a ball [rad], else NaN.
+        side: Of a goal post, see `Feature`.
     """
 
     kind: FeatureClass
     rays: Array
     footed: bool = True
     angular_radius: float = nan
+    side: int = 0
 
 
 @dataclass(frozen=True)
@@ -223,8 +227,8 @@ class Perception:
     def _things(self, scene: _Scene) -> Iterator[Glimpse]:
         p, truth = self._parameters, scene.truth
         yield from self._ball(scene)
-        for x, y, _, height in self._posts:
-            yield from self._upright(scene, FeatureClass.GOAL_POST, (x, y), height)
+        for goal in (self._field.own_goal, self._field.opponent_goal):
+            yield from self._goal(scene, goal)
         if truth.poles:
             for pole in self._field.poles:
                 yellow = pole.colours[0] == "yellow"
@@ -279,6 +283,25 @@ class Perception:
             yield Glimpse(kind, rays[:1])
         elif kind is FeatureClass.GOAL_POST and seen.sum() >= 4:
             yield Glimpse(kind, rays[np.flatnonzero(seen)[:1]], footed=False)
+
+    def _goal(self, scene: _Scene, goal: Goal) -> Iterator[Glimpse]:
+        """Yield the posts, each with its side where enough of the crossbar is seen, and the goal if both feet are."""
+        posts = []
+        for post, mate in zip(goal.posts, goal.posts[::-1], strict=True):
+            place, other = np.array([post.x, post.y]), np.array([mate.x, mate.y])
+            bar = np.full((len(BESIDE), 3), post.height - post.radius)
+            bar[:, :2] = place + BESIDE[:, None] * (other - place)
+            _, seen = self._visible(scene, bar, self._parameters.upright_range)
+            left = bool(has_side(scene.eye[:2], place[None], other[None], LEFT)[0])
+            side = 0 if seen.sum() < LEAST_SEEN else LEFT if left else RIGHT
+            for glimpse in self._upright(scene, FeatureClass.GOAL_POST, (post.x, post.y), post.height):
+                posts.append((left, replace(glimpse, side=side)))
+        if len(posts) == 2:  # then there is no doubt
+            posts = [(left, replace(glimpse, side=LEFT if left else RIGHT)) for left, glimpse in posts]
+        yield from (glimpse for _, glimpse in posts)
+        if len(posts) == 2 and all(glimpse.footed for _, glimpse in posts):
+            feet = [glimpse.rays for left, glimpse in sorted(posts, key=lambda each: not each[0])]
+            yield Glimpse(FeatureClass.GOAL, np.concatenate(feet))
 
     def _opponent(self, scene: _Scene) -> Iterator[Glimpse]:
         keeper = scene.truth.keeper
@@ -341,6 +364,7 @@ class Perception:
             end_azimuth,
             end_elevation,
             radius,
+            glimpse.side,
         )
 
     def _false(self, kinds: tuple[FeatureClass, ...], view: View, rng: np.random.Generator) -> list[Feature]:

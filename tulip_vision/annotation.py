@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 
 from tulip_vision.features import Feature, FeatureClass, Features
 from tulip_vision.findings import Refusal
+from tulip_vision.goals import GoalParameters
 from tulip_vision.lines import Lines
-from tulip_vision.view import Array, View, direction_of
+from tulip_vision.view import Array, View, direction_of, directions_of
 
 Colour = tuple[int, int, int]
 
@@ -29,12 +31,14 @@ COLOURS: dict[FeatureClass, Colour] = {
     FeatureClass.PENALTY_MARK: (255, 255, 255),
     FeatureClass.CENTRE_CIRCLE: (200, 120, 120),
     FeatureClass.FIELD_BORDER: (0, 255, 120),
+    FeatureClass.GOAL: (0, 200, 200),
 }
 """BGR of each class."""
 
 LABELS = {
     FeatureClass.BALL: "ball",
     FeatureClass.GOAL_POST: "post",
+    FeatureClass.GOAL: "goal",
     FeatureClass.OPPONENT: "opponent",
     FeatureClass.CROSSING_L: "L",
     FeatureClass.CROSSING_T: "T",
@@ -89,6 +93,9 @@ def _name(kind: FeatureClass) -> str:
 
 def _draw(drawn: NDArray[np.uint8], feature: Feature, view: View) -> None:
     colour = COLOURS[feature.kind]
+    if feature.kind == FeatureClass.GOAL:
+        _draw_goal(drawn, feature, view)
+        return
     if not math.isnan(feature.end_azimuth):
         share = np.linspace(0.0, 1.0, 12)[:, None]
         ends = np.stack(
@@ -109,7 +116,8 @@ def _draw(drawn: NDArray[np.uint8], feature: Feature, view: View) -> None:
     if not np.isfinite(pixel).all():
         return
     u, v = round(float(pixel[0])), round(float(pixel[1]))
-    text = f"{_name(feature.kind)} {feature.confidence:.2f}"
+    which = {1: "left ", -1: "right "}.get(feature.side, "")
+    text = f"{which}{_name(feature.kind)} {feature.confidence:.2f}"
     if feature.kind == FeatureClass.BALL:
         direction = direction_of(feature.azimuth, feature.elevation)
         cv2.circle(
@@ -118,6 +126,27 @@ def _draw(drawn: NDArray[np.uint8], feature: Feature, view: View) -> None:
     else:
         cv2.drawMarker(drawn, (u, v), colour, cv2.MARKER_CROSS, 12, 1)
     _label(drawn, (u + 8, v - 6), text, colour, 0.4)
+
+
+def _draw_goal(drawn: NDArray[np.uint8], goal: Feature, view: View) -> None:
+    """Draw what is believed of a goal: both posts and the bar where both feet are known, else only its name."""
+    height = GoalParameters.height  # drawn where it is believed; its size is the rule's
+    azimuths, elevations = np.array([[goal.azimuth, goal.end_azimuth], [goal.elevation, goal.end_elevation]])
+    feet = view.ground(directions_of(azimuths, elevations))
+    corners = np.column_stack([feet[[0, 0, 1, 1]], [0.0, height, height, 0.0]])
+    share = np.linspace(0.0, 1.0, 12)[:, None]
+    for start, end in pairwise(corners):
+        _polyline(drawn, view.pixels(start + share * (end - start)), COLOURS[goal.kind])
+    for foot in feet[np.isfinite(feet).all(axis=1)][:1]:
+        u, v = view.pixels_on_ground(foot[None])[0]
+        if math.isfinite(u):
+            _label(
+                drawn,
+                (round(u) + 8, round(v) + 8),
+                f"{_name(goal.kind)} {goal.confidence:.2f}",
+                COLOURS[goal.kind],
+                0.4,
+            )
 
 
 def _polyline(drawn: NDArray[np.uint8], points: Array, colour: Colour) -> None:

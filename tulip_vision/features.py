@@ -32,6 +32,9 @@ class FeatureClass(IntEnum):
     """Direction of the circle's middle on the ground, which need not be in the picture."""
     FIELD_BORDER = 11
     """A straight edge of the carpet, where green ends; both ends given, as for LINE."""
+    GOAL = 12
+    """Two posts that belong together: the foot of the left one, and that of the right one as the other end; each
+    elevation is NaN where that foot is hidden."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +50,9 @@ class Feature:
         elevation: [rad], positive up; NaN where it is not known.
         azimuth_spread, elevation_spread: Standard deviations [rad].
         confidence: 0 to 1.
-        end_azimuth, end_elevation: Other end of a LINE or FIELD_BORDER [rad], else NaN.
+        end_azimuth, end_elevation: Other end of a LINE, FIELD_BORDER or GOAL [rad], else NaN.
         angular_radius: Half the angle that a BALL fills [rad], else NaN.
+        side: 1 for a GOAL_POST that is the left one of its goal as the camera sees it, -1 for the right one, else 0.
     """
 
     kind: FeatureClass
@@ -60,6 +64,7 @@ class Feature:
     end_azimuth: float = nan
     end_elevation: float = nan
     angular_radius: float = nan
+    side: int = 0
 
 
 @dataclass(frozen=True)

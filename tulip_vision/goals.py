@@ -1,4 +1,4 @@
-"""Goal posts: yellow uprights that reach above the horizon; the crossbar confirms them."""
+"""Goal posts: yellow uprights that reach above the horizon."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from math import nan
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tulip_description.planar import wrap_angle
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
 from tulip_vision.segmentation import Colour, Segmentation, belongs
-from tulip_vision.upright import Upright, find_uprights, foot_on_ground
-from tulip_vision.view import Array, View, direction_of
+from tulip_vision.upright import Upright, axis_samples, find_uprights, foot_on_ground
+from tulip_vision.view import View, direction_of
 
-TURNS = np.radians([0.0, -30.0, 30.0, -60.0, 60.0])
-"""Of a crossbar against the line across the line of sight, at which it is looked for."""
+WITHOUT_BAR = 0.75
+"""Confidence in a post of which no crossbar is seen yet."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,7 @@ class GoalParameters:
         diameter: Of a post [m].
         height: Of the crossbar's middle above the ground [m].
         width: Between the middles of the two posts [m].
+        width_error: By which two posts may stand otherwise [m], beside the spread of their places.
         least_area: Smallest yellow patch looked at [px^2].
         width_tolerance: Largest ratio, either way, between the seen width and the one that fits the place.
         width_slack: Difference of width that is always allowed [px].
@@ -37,6 +38,7 @@ class GoalParameters:
     diameter: float = 0.11
     height: float = 1.855
     width: float = 2.71
+    width_error: float = 0.1
     least_area: float = 20.0  # [px^2] at 11 m a post is 4 px wide and 45 px high below the horizon
     width_tolerance: float = 1.7
     width_slack: float = 2.5  # [px]
@@ -49,7 +51,7 @@ class GoalParameters:
         Raises:
             ValueError: if one is out of range.
         """
-        for name in ("diameter", "height", "width", "least_area", "farthest"):
+        for name in ("diameter", "height", "width", "width_error", "least_area", "farthest"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} is {getattr(self, name)}; expected > 0")
         if self.width_tolerance <= 1.0 or self.width_slack < 0.0:
@@ -72,7 +74,7 @@ def find_goal_posts(segmentation: Segmentation, view: View, parameters: GoalPara
         result = _examine(upright, segmentation, view, parameters)
         if isinstance(result, str):
             refusals.append(Refusal(FeatureClass.GOAL_POST, upright.pixel, result))
-        elif any(_angle(post.azimuth, result.azimuth) < max(upright.width, 0.01) for post in posts):
+        elif any(abs(wrap_angle(post.azimuth - result.azimuth)) < max(upright.width, 0.01) for post in posts):
             refusals.append(Refusal(FeatureClass.GOAL_POST, upright.pixel, "part of a post already found"))
         else:
             posts.append(result)
@@ -92,7 +94,8 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
         smallest = 0.0 if upright.cut else fitting / parameters.width_tolerance - slack
         if not smallest <= upright.width <= fitting * parameters.width_tolerance + slack:
             return f"{upright.width * distance:.2f} m wide"
-        along, bar = _along(segmentation, view, foot, parameters)
+        heights = np.linspace(0.15, parameters.height - 0.15, 18)
+        along = axis_samples(view, segmentation.classes, foot, heights)
         if len(along) < 3:
             return "too little of it in the picture"  # the lowest segment of a pole would look the same
         yellow = float(belongs(along, Colour.YELLOW).mean())
@@ -102,7 +105,7 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
             return "blue above it: a pole"
         direction = direction_of(upright.azimuth, elevation)
         azimuth_spread, elevation_spread = view.spreads(direction, 2.0 if upright.cut else 1.0)
-        confidence = (0.75 + 0.25 * bar) * min(1.0, yellow / 0.9)
+        confidence = WITHOUT_BAR * min(1.0, yellow / 0.9)
         return Feature(FeatureClass.GOAL_POST, upright.azimuth, elevation, azimuth_spread, elevation_spread, confidence)
     if upright.foot_seen:
         return f"foot {distance:.1f} m away"
@@ -119,41 +122,3 @@ def _examine(upright: Upright, segmentation: Segmentation, view: View, parameter
         return "foot hidden and too thin"
     azimuth_spread, _ = view.spreads(direction_of(upright.azimuth, 0.5 * (upright.low + upright.high)), 1.5)
     return Feature(FeatureClass.GOAL_POST, upright.azimuth, nan, azimuth_spread, nan, confidence=0.5)
-
-
-def _along(
-    segmentation: Segmentation, view: View, foot: Array, parameters: GoalParameters
-) -> tuple[NDArray[np.uint8], float]:
-    """Read the picture along a post and where a crossbar may leave its upper end.
-
-    Which way the goal faces is not known: the bar is looked for across the line of sight, within 60 deg.
-
-    Args:
-        segmentation: Of the picture.
-        view: Of the picture.
-        foot: (2,) of the post in base_footprint [m].
-        parameters: How a goal looks.
-
-    Returns:
-        (n,) classes along the part of the post's axis that is in the picture; and how much of a crossbar there is on
-        one side, 0 to 1; 0 if it is out of view.
-    """
-    heights = np.linspace(0.15, parameters.height - 0.15, 18)
-    ahead = (foot - view.position[:2]) / max(math.hypot(*(foot - view.position[:2])), 1e-6)
-    across = np.array([-ahead[1], ahead[0]])
-    ways = np.cos(TURNS)[:, None] * across + np.sin(TURNS)[:, None] * ahead  # (5, 2)
-    reach = np.linspace(0.15, 0.5, 6)[:, None] * parameters.width
-    points = np.empty((len(heights) + 2 * len(ways) * len(reach), 3))
-    points[: len(heights), :2], points[: len(heights), 2] = foot, heights
-    bars = ways[:, None] * reach  # (5, 6, 2)
-    points[len(heights) :, :2] = foot + np.concatenate([bars, -bars]).reshape(-1, 2)
-    points[len(heights) :, 2] = parameters.height
-    classes, inside = view.sample(segmentation.classes, view.pixels(points))
-    along: NDArray[np.uint8] = classes[: len(heights)][inside[: len(heights)]]
-    yellow = belongs(classes[len(heights) :], Colour.YELLOW).reshape(-1, len(reach)).sum(axis=1)
-    seen = inside[len(heights) :].reshape(-1, len(reach)).sum(axis=1)
-    return along, float(np.where(seen >= 3, yellow / np.maximum(seen, 1), 0.0).max())
-
-
-def _angle(first: float, second: float) -> float:
-    return abs((first - second + math.pi) % (2.0 * math.pi) - math.pi)

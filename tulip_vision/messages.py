@@ -35,6 +35,7 @@ def features_to_message(features: Features) -> FeaturesMessage:
             end_azimuth=float(feature.end_azimuth),
             end_elevation=float(feature.end_elevation),
             angular_radius=float(feature.angular_radius),
+            side=int(feature.side),
         )
         for feature in features.features
     ]

@@ -17,6 +17,7 @@ from tulip_vision.border import BorderParameters, find_border
 from tulip_vision.crossings import CrossingParameters, find_crossings, find_penalty_marks
 from tulip_vision.features import Feature, Features
 from tulip_vision.findings import Findings, Refusal
+from tulip_vision.goal_frames import find_goals
 from tulip_vision.goals import GoalParameters, find_goal_posts
 from tulip_vision.lens import Lens
 from tulip_vision.line_points import LinePointParameters, find_line_points
@@ -96,7 +97,7 @@ INPUTS = ("picture", "view")
 SMALLEST = 16
 """[px] width and height of a picture: the search for the carpet looks at two columns of it then."""
 
-DETECTORS = ("ball", "goal_posts", "poles", "opponents", "crossings", "penalty_marks", "border")
+DETECTORS = ("ball", "goals", "poles", "opponents", "crossings", "penalty_marks", "border")
 """Values of type `Findings`; their features are the result, together with the lines."""
 
 
@@ -115,6 +116,7 @@ def stages(parameters: VisionParameters, own_body: OwnBody | None = None) -> tup
         Stage("segment", ("picture", "view", "own_body"), "segmentation", segmenter.segment),
         Stage("find ball", seen, "ball", lambda s, v: find_ball(s, v, p.ball)),
         Stage("find goal posts", seen, "goal_posts", lambda s, v: find_goal_posts(s, v, p.goals)),
+        Stage("pair goal posts", ("goal_posts", *seen), "goals", lambda q, s, v: find_goals(q, s, v, p.goals)),
         Stage("find poles", seen, "poles", lambda s, v: find_poles(s, v, p.poles)),
         Stage(
             "find opponents",

@@ -77,10 +77,19 @@ class Landmarks:
     Attributes:
         points: For each feature class, (n, 2) places in map [m].
         lines: Straight lines.
+        mates: (n, 2) for each goal post, the other one of its goal [m].
     """
 
     points: dict[FeatureClass, Array]
     lines: Lines
+    mates: Array
+
+    def of(self, feature: Feature) -> Array:
+        """Return (n, 2) places in map that a feature may show, seen from anywhere between the goal lines [m]."""
+        points = self.points[feature.kind]
+        if feature.side == 0:
+            return points
+        return points[has_side(np.zeros(2), points, self.mates, feature.side)]
 
 
 def landmarks_of(field: Field) -> Landmarks:
@@ -97,7 +106,22 @@ def landmarks_of(field: Field) -> Landmarks:
     return Landmarks(
         {kind: np.array(places, dtype=np.float64).reshape(-1, 2) for kind, places in points.items()},
         lines_of(field.line_segments),
+        np.array([(mate.x, mate.y) for goal in (field.own_goal, field.opponent_goal) for mate in goal.posts[::-1]]),
     )
+
+
+def has_side(place: Array, points: Array, mates: Array, side: int) -> NDArray[np.bool_]:
+    """Return (n,) which posts are the left (side 1) or the right one (side -1) of their goals.
+
+    Args:
+        place: (2,) from where they are seen [m].
+        points: (n, 2) the posts [m].
+        mates: (n, 2) the other posts of their goals [m].
+        side: See `Feature.side`.
+    """
+    to_post, to_mate = points - place, mates - place
+    left = to_post[:, 0] * to_mate[:, 1] - to_post[:, 1] * to_mate[:, 0] < 0.0  # its mate is to the right of it
+    return left if side > 0 else ~left
 
 
 def point_directions(state: Array, points: Array, camera_position: Array) -> tuple[Array, Array]:
@@ -216,7 +240,14 @@ def half_turn(angles: Array) -> Array:
 class PointObservation:
     """A feature that shows one of several places on the ground."""
 
-    def __init__(self, feature: Feature, points: Array, camera_position: Array, landmark_spread: float):
+    def __init__(
+        self,
+        feature: Feature,
+        points: Array,
+        camera_position: Array,
+        landmark_spread: float,
+        mates: Array | None = None,
+    ):
         """Remember what was seen.
 
         Args:
@@ -224,10 +255,12 @@ class PointObservation:
             points: (n, 2) places in map that it may be [m].
             camera_position: (3,) optical centre in base_footprint [m].
             landmark_spread: Standard deviation of the landmark's place along each axis [m].
+            mates: (n, 2) the other posts of the goals, for a post of which the side is known [m].
         """
         self.feature = feature
         self._count = len(points)
         self._points = points
+        self._mates = mates if feature.side else None
         self._camera_position = camera_position
         self._landmark_spread = landmark_spread
         self._azimuth_variance = feature.azimuth_spread**2
@@ -240,8 +273,10 @@ class PointObservation:
         return tuple(self._points[candidate])
 
     def possible(self, state: Array) -> Indices:
-        """Return the candidates worth a look: all of them, (n,)."""
-        return np.arange(self._count)
+        """Return the candidates worth a look, (n,): all, but for posts on the other side of their goals."""
+        if self._mates is None:
+            return np.arange(self._count)
+        return np.flatnonzero(has_side(state[:2], self._points, self._mates, self.feature.side))
 
     def linearize(self, state: Array, candidates: Indices) -> tuple[Array, Array, Array]:
         """Return innovations (k, m), their Jacobians (k, m, 7) and noise (k, m, m) of some candidates."""

@@ -36,6 +36,8 @@ from tulip_worldmodel.side import SideJudge, is_pole
 
 Array = NDArray[np.float64]
 
+NO_LANDMARKS = (FeatureClass.BALL, FeatureClass.OPPONENT, FeatureClass.FIELD_BORDER, FeatureClass.GOAL)
+"""Nothing is learnt from these: some move, a carpet ends anywhere, and a goal's posts are features themselves."""
 LEAST_WEIGHT = 1e-4  # a hypothesis below it is dropped
 TRUST_TIME = 10.0  # [s] in which the heading kept for the case of being lost follows the filter's
 
@@ -139,7 +141,7 @@ class Localization:
         observations: list[Observation] = []
         shown: list[Feature] = []
         for feature in features.features:
-            if feature.kind in (FeatureClass.BALL, FeatureClass.OPPONENT, FeatureClass.FIELD_BORDER):
+            if feature.kind in NO_LANDMARKS:
                 continue
             observation, reason = self._observation(feature, features.camera_position)
             if observation is None:
@@ -241,4 +243,6 @@ class Localization:
             return None, "too far away"
         if math.isnan(feature.elevation) and feature.kind in CROSSINGS:
             return None, "a crossing without elevation"
-        return PointObservation(feature, self._landmarks.points[feature.kind], camera_position, p.landmark_spread), ""
+        points = self._landmarks.points[feature.kind]
+        mates = self._landmarks.mates if feature.kind is FeatureClass.GOAL_POST else None
+        return PointObservation(feature, points, camera_position, p.landmark_spread, mates), ""

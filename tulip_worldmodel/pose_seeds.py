@@ -53,7 +53,7 @@ class Seed:
 
 @dataclass(frozen=True)
 class _Point:
-    kind: FeatureClass
+    landmarks: Array  # (n, 2) that it may be, in map [m]
     place: Array  # (2,) in base_footprint [m]
     spread: float  # [m]
 
@@ -130,7 +130,9 @@ class SeedFinder:
                 place = _ground(features.camera_position, feature.azimuth, feature.elevation)
                 distance = float(np.linalg.norm(place))
                 if distance < LONGEST_RANGE:
-                    found.append(_Point(feature.kind, place, NEAREST_SPREAD + SPREAD_PER_METRE * distance))
+                    found.append(
+                        _Point(self._landmarks.of(feature), place, NEAREST_SPREAD + SPREAD_PER_METRE * distance)
+                    )
         return found
 
     def _pieces(self, features: Features) -> list[_Piece]:
@@ -157,16 +159,15 @@ class SeedFinder:
             if piece.length >= LONG_LINE:
                 yaws += [wrap_angle(quarter * math.pi / 2.0 - piece.direction) for quarter in range(4)]
         for point in points:
-            places = self._landmarks.points[point.kind]
             for yaw in yaws:
-                found.append(_poses(places, np.full(len(places), yaw), point.place))
+                found.append(_poses(point.landmarks, np.full(len(point.landmarks), yaw), point.place))
         for first, second in permutations(points, 2):
             if first.spread < second.spread:  # the nearer one fixes the place
                 found.append(self._from_pair(first, second))
         return np.concatenate(found)
 
     def _from_pair(self, first: _Point, second: _Point) -> Array:
-        ours, theirs = self._landmarks.points[first.kind], self._landmarks.points[second.kind]
+        ours, theirs = first.landmarks, second.landmarks
         ways = theirs[None] - ours[:, None]  # (a, b, 2)
         way = second.place - first.place
         lengths = np.hypot(ways[..., 0], ways[..., 1])
@@ -176,7 +177,7 @@ class SeedFinder:
         return _poses(ours[chosen], yaws, first.place)
 
     def _point_cost(self, poses: Array, point: _Point) -> Array:
-        places = self._landmarks.points[point.kind]
+        places = point.landmarks
         if not len(places):
             return np.full(len(poses), MOST)
         seen = _in_map(poses, point.place[None])[:, 0]

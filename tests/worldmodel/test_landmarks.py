@@ -8,9 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tulip_description.field import LineSegment, load_field
-from tulip_vision.features import FeatureClass
+from tulip_vision.features import Feature, FeatureClass
 from tulip_worldmodel.direction import directions, meet_plane, rays
-from tulip_worldmodel.landmarks import LinePiece, half_turn, landmarks_of, lines_of, point_directions
+from tulip_worldmodel.landmarks import (
+    LinePiece,
+    PointObservation,
+    half_turn,
+    has_side,
+    landmarks_of,
+    lines_of,
+    point_directions,
+)
 
 CAMERA = np.array([0.05, 0.02, 1.15])
 STEP = 1e-6
@@ -122,3 +130,29 @@ def test_field_gives_its_landmarks_by_class() -> None:
 def test_field_without_poles_has_no_pole_landmarks() -> None:
     points = landmarks_of(load_field().without_poles()).points
     assert points[FeatureClass.POLE_YELLOW_BLUE_YELLOW].shape == (0, 2)
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0), (-3.0, 2.0), (4.0, -2.5)])
+@pytest.mark.parametrize("side", [1, -1])
+def test_post_with_a_side_is_one_of_two_from_between_the_goal_lines(place, side) -> None:
+    landmarks = landmarks_of(load_field())
+    post = Feature(FeatureClass.GOAL_POST, 0.0, -0.2, 0.01, 0.01, 1.0, side=side)
+    expected = {(4.5, side * 1.355), (-4.5, side * -1.355)}  # the left one is at +y where x points to the goal
+    assert {tuple(each) for each in landmarks.of(post)} == expected
+    observation = PointObservation(post, landmarks.points[FeatureClass.GOAL_POST], CAMERA, 0.0, landmarks.mates)
+    possible = observation.possible(np.array([*place, 0.7, 0.0, 0.0, 0.0, 0.0]))
+    assert {tuple(each) for each in landmarks.points[FeatureClass.GOAL_POST][possible]} == expected
+
+
+def test_from_behind_the_goal_line_left_and_right_change_places() -> None:
+    landmarks = landmarks_of(load_field())
+    posts = landmarks.points[FeatureClass.GOAL_POST]
+    left = posts[has_side(np.array([5.0, 0.0]), posts, landmarks.mates, 1)]
+    assert {tuple(each) for each in left} == {(4.5, -1.355), (-4.5, -1.355)}
+
+
+def test_post_without_a_side_may_be_any() -> None:
+    landmarks = landmarks_of(load_field())
+    post = Feature(FeatureClass.GOAL_POST, 0.0, -0.2, 0.01, 0.01, 1.0)
+    observation = PointObservation(post, landmarks.of(post), CAMERA, 0.0, landmarks.mates)
+    assert len(observation.possible(np.zeros(7))) == 4

@@ -11,6 +11,7 @@ import numpy as np
 from tulip_description.field import load_field
 from tulip_description.robot import load_robot
 from tulip_sim.bench.runner import Bench, Row
+from tulip_sim.bench.vision_goals import GoalCounts, count_goals
 from tulip_sim.bench.vision_picture import draw_scenes
 from tulip_sim.bench.vision_real import draw_real, measure_real, real_table
 from tulip_sim.bench.vision_score import LINE_LIMITS, Judge
@@ -33,11 +34,13 @@ def measure_scenes(seed: int) -> Row:
     sightings: list[str] = []
     lines = {"believed": [np.empty(0)], "own": [np.empty(0)]}
     border = [np.empty(0)]
+    goals = GoalCounts()
     pictures, brightness = 0, 0.0
     vision: Vision | None = None
     for shot in shots(seed):
         vision = vision or vision_of(shot)  # one robot has one camera
         features = vision.process(shot.picture, shot.stamp, shot.believed)
+        goals += count_goals(features.features, judge.things(shot)["post"], shot.true[:3, 3])
         sightings += [each.to_text() for each in judge.sightings(shot, pictures, features)]
         errors = judge.line_errors(shot, features)
         lines["believed"].append(errors.believed)
@@ -50,7 +53,7 @@ def measure_scenes(seed: int) -> Row:
         row[f"line points, {name}"] = [len(values), *(int((values < limit).sum()) for limit in LINE_LIMITS)]
     values = np.concatenate(border)
     row["border points"] = [len(values), *(int((values < limit).sum()) for limit in LINE_LIMITS)]
-    return {**row, "sightings": sightings}
+    return {**row, "goals": vars(goals), "sightings": sightings}
 
 
 def measure(part: str, seed: int) -> Row:

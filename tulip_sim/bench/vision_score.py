@@ -108,13 +108,17 @@ class Judge:
             number: Of the picture.
             features: What vision found in it.
         """
-        view = View(self._lens, shot.true, SpreadParameters())
-        scene, _ = scene_of(replace(shot.truth, keeper=None), self._body, "cyan")
         result: list[Sighting] = []
-        for name, present in things(shot.truth, scene.boxes, self._field, view).items():
+        for name, present in self.things(shot).items():
             found = [each for each in features.features if each.kind in GROUPS[name]]
             result += self._compare(name, present, found, shot, number, features)
         return result
+
+    def things(self, shot: Shot) -> dict[str, list[Thing]]:
+        """Return what a picture shows, by the names of `GROUPS`."""
+        view = View(self._lens, shot.true, SpreadParameters())
+        scene, _ = scene_of(replace(shot.truth, keeper=None), self._body, "cyan")
+        return things(shot.truth, scene.boxes, self._field, view)
 
     def line_errors(self, shot: Shot, features: Features) -> LineErrors:
         """Return how far the pieces of line of a picture are from the field's lines."""

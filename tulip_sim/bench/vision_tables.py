@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_sim.bench.runner import Row
+from tulip_sim.bench.vision_goals import FARTHEST, GoalCounts
 from tulip_sim.bench.vision_score import LINE_LIMITS, Sighting
 
 Array = NDArray[np.float64]
@@ -63,6 +64,12 @@ def figures(rows: Sequence[Row]) -> list[tuple[str, str, str, bool]]:
         ("poles", "pole", 0.95),
     ):
         result.append(recall(f"{what}, to {RANGES[name]:g} m", name, bar, 0.0, RANGES[name]))
+    goals = sum((GoalCounts(**row["goals"]) for row in rows), GoalCounts())
+    share = goals.paired / max(goals.there, 1)
+    value = f"{share:.3f} ({goals.paired} of {goals.there}); {goals.false} false"
+    result.append((f"goals: the two posts of one paired, to {FARTHEST:g} m", "", value, goals.false == 0))
+    value = f"{goals.sided} of {goals.posts} have one; {goals.wrong} wrong"
+    result.append(("posts: left or right one of its goal", "", value, goals.wrong == 0))
     crossings = [each for each in all_seen if each.name == "crossing" and each.found]
     wrong = sum(each.state == "false" for each in crossings)
     share = wrong / max(len(crossings), 1)
