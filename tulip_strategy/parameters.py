@@ -96,6 +96,24 @@ class StrategyParameters(GazeParameters):
     search_turn_speed: float = 0.5  # [rad/s] slow enough for a picture every 2 deg
     search_walk_time: float = 6.0  # [s] towards the field's middle after a whole turn without a ball
 
+    # Goalkeeper.
+    keeper_out: float = 0.95  # [m] before the goal line: as far as the goal area reaches; it hides more of the goal
+    keeper_nearest: float = 0.5  # [m] to a ball before the robot; nearer, it stands half-way between ball and goal
+    keeper_place_tolerance: float = 0.08  # [m] and [rad]
+    keeper_alert: float = 4.0  # [m] a ball nearer than this may be shot: steps on the spot, to be quick
+    keeper_shot_speed: float = 0.5  # [m/s] a ball that rolls towards the goal as fast as this is a shot
+    keeper_shot_over: float = 0.15  # [m/s] slower, it is none any more
+    keeper_side_speed: float = 0.3  # [m/s] asked of the legs, which give what they can
+    keeper_cover: float = 0.08  # [m] to each side of the middle, where the feet stop a ball without a step
+    keeper_full_speed_offset: float = 0.1  # [m] beyond that from which it steps as fast as it can
+    keeper_toes: float = 0.1  # [m] before base_footprint, where the feet meet a ball
+    keeper_roll_margin: float = 0.3  # [m] a ball may roll farther than expected
+    keeper_beside: float = 0.4  # [m] beside a post, where a shot may go in after all
+    keeper_still_speed: float = 0.25  # [m/s] a slower ball may be cleared
+    keeper_clear_depth: float = 1.6  # [m] from the goal line, the ball is the keeper's
+    keeper_clear_margin: float = 0.4  # [m] farther once it goes for it
+    keeper_clear_reach: float = 4.0  # [m] how far away the point lies that a cleared ball is sent to
+
     # Game.
     game_state_limit: float = 30.0  # [s] no referee packet for so long: stand; shorter gaps are lost packets
     walk_to_ready: bool = False  # in dribble and kick the robot is placed by hand

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from py_trees.behaviour import Behaviour
 
 from tulip_description.field import Field
@@ -51,8 +53,6 @@ class Strategy:
         context.clear_wish()
         if world is not None:
             context.ball.update(world)
-            if context.ball.position is not None:
-                context.aim.update(world, context.ball.position, context.dt)
         self._tree.tick_once()
         return Decision(stamp, self._walk(), self._head(), context.kick, active_path(self._tree))
 
@@ -61,7 +61,7 @@ class Strategy:
         if context.mode is not WalkMode.WALK:
             self._acceleration.reset()
             return WalkCommand(context.stamp, context.mode, STILL)
-        velocity = self._acceleration.step(context.velocity, context.dt)
+        velocity = self._acceleration.step(context.velocity, math.inf if context.sudden else context.dt)
         return WalkCommand(context.stamp, WalkMode.WALK, velocity)
 
     def _head(self) -> HeadCommand:

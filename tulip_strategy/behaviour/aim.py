@@ -1,4 +1,4 @@
-"""Where to send the ball: free angles of the goal beside the keeper."""
+"""Where to send the ball: the free part of the goal beside the keeper, or a point."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from tulip_description.planar import wrap_angle
+from tulip_description.field import Field
+from tulip_description.planar import Pose2D, wrap_angle
+from tulip_strategy.parameters import StrategyParameters
+from tulip_worldmodel.world_state import WorldState
 
 Point = tuple[float, float]
 
@@ -91,3 +94,77 @@ def choose_gap(gaps: tuple[Gap, ...], previous: float | None, preference: float)
         return gap.width * (preference if held else 1.0)
 
     return max(gaps, key=worth, default=None)
+
+
+class Aim:
+    """Keeps a smooth point to send the ball to: each strategy says at every decision what it aims at.
+
+    The point is smoothed in odom, whose short-term errors are far smaller than those of localization: a pose
+    estimate that jitters would else turn the direction with it.
+
+    Attributes:
+        direction: From the ball to the point, in base_footprint [rad].
+        gap: Free angle round it [rad], 0 without a free gap.
+        distance: Ball to the middle of the goal, or to the point [m].
+    """
+
+    def __init__(self, parameters: StrategyParameters, field: Field) -> None:
+        self._parameters = parameters
+        self._field = field
+        self._point_in_odom: Point | None = None  # on the goal line [m]
+        self.direction = 0.0
+        self.gap = 0.0
+        self.distance = math.inf
+
+    def at_point(self, world: WorldState, ball: Point, point: Point, dt: float) -> None:
+        """Aim at a point of map [m], `dt` [s] after the last time; `ball` is in base_footprint [m]."""
+        relative = world.robot.pose.inverse().transform(point)
+        self.distance, self.gap = math.dist(ball, relative), math.pi
+        odom = world.robot.pose_in_odom
+        self._point_in_odom = self._smoothed(odom.transform(relative), dt)
+        self.direction = self._direction(odom, ball, self._point_in_odom)
+
+    def at_goal(self, world: WorldState, ball: Point, dt: float) -> None:
+        """Aim at the free part of the goal that is widest, as ball and opponents are relative to the robot now."""
+        goal = self._field.opponent_goal
+        robot, odom = world.robot.pose, world.robot.pose_in_odom
+        to_robot = robot.inverse()
+        left, right = (to_robot.transform((post.x, post.y)) for post in goal.posts)
+        middle = to_robot.transform((goal.x, 0.0))
+        self.distance = math.dist(ball, middle)
+        opponents = [(float(seen.position[0]), float(seen.position[1])) for seen in world.opponents]
+        in_front = [point for point in opponents if math.dist(ball, point) < self.distance + 0.5]
+        gaps = free_gaps(
+            ball,
+            (left, right),
+            goal.posts[0].radius,
+            in_front or [middle],  # a keeper not seen yet most likely stands in the middle
+            self._parameters.opponent_radius,
+            self._field.ball_radius,
+        )
+        previous = None if self._point_in_odom is None else self._direction(odom, ball, self._point_in_odom)
+        gap = choose_gap(gaps, previous, self._parameters.gap_preference)
+        self.gap = 0.0 if gap is None else gap.width
+        across = 0.0 if gap is None else self._crossing(robot, ball, gap.middle)
+        point = odom.transform(to_robot.transform((goal.x, across)))
+        self._point_in_odom = self._smoothed(point, dt)
+        self.direction = self._direction(odom, ball, self._point_in_odom)
+
+    def _crossing(self, robot: Pose2D, ball: Point, direction: float) -> float:
+        """Return y in map [m] where a ray from the ball crosses the goal line, kept between the posts."""
+        x, y = robot.transform(ball)
+        along = robot.yaw + direction
+        slope = math.sin(along) / max(math.cos(along), 0.05)
+        half = 0.5 * self._field.goal_width - self._field.ball_radius
+        return max(-half, min(half, y + slope * (self._field.opponent_goal.x - x)))
+
+    def _smoothed(self, point: Point, dt: float) -> Point:
+        old = self._point_in_odom
+        if old is None or math.dist(old, point) > self._parameters.aim_jump:
+            return point
+        share = 1.0 - math.exp(-dt / self._parameters.aim_time)
+        return old[0] + share * (point[0] - old[0]), old[1] + share * (point[1] - old[1])
+
+    def _direction(self, odom: Pose2D, ball: Point, point_in_odom: Point) -> float:
+        point = odom.inverse().transform(point_in_odom)
+        return math.atan2(point[1] - ball[1], point[0] - ball[0])

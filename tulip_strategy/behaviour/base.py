@@ -1,4 +1,4 @@
-"""The two kinds of leaves of the tree."""
+"""The kinds of leaves of the tree."""
 
 from __future__ import annotations
 
@@ -41,6 +41,19 @@ class Act(Leaf):
         """Do it."""
         self._act(self.context)
         return Status.RUNNING
+
+
+class Do(Leaf):
+    """Does one thing and succeeds, for what comes after it."""
+
+    def __init__(self, name: str, context: Context, act: Callable[[Context], None]) -> None:
+        super().__init__(name, context)
+        self._act = act
+
+    def update(self) -> Status:
+        """Do it."""
+        self._act(self.context)
+        return Status.SUCCESS
 
 
 class ForSeconds(Leaf):

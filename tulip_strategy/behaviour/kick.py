@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Sequence
 from py_trees.decorators import FailureIsRunning
@@ -25,8 +26,8 @@ class KickChance(Leaf):
         parameters, aim = self.context.parameters, self.context.aim
         reach = parameters.kick_range_end if self._holds else parameters.kick_range
         gap = parameters.kick_gap_end if self._holds else parameters.kick_gap
-        wide_enough = aim.gap >= gap or aim.goal_distance < parameters.kick_always_range
-        self._holds = aim.goal_distance <= reach and wide_enough
+        wide_enough = aim.gap >= gap or aim.distance < parameters.kick_always_range
+        self._holds = aim.distance <= reach and wide_enough
         return Status.SUCCESS if self._holds else Status.FAILURE
 
 
@@ -189,12 +190,17 @@ class KickUnderWay(Leaf):
         return Status.RUNNING
 
 
-def kick_ball(context: Context) -> Sequence:
-    """Return the subtree that lines up and kicks."""
+def line_up_and_kick(context: Context) -> Behaviour:
+    """Return the subtree that lines up and kicks along the aim."""
     foot = Foot()
     kick = Sequence("line up and kick", memory=True)
     kick.add_children([Align(context, foot), Settle(context, foot), Strike(context, foot)])
-    sequence = Sequence("kick at goal", memory=False)
     # Not standing right after all means to line up again, not to dribble.
-    sequence.add_children([KickChance(context), FailureIsRunning("until it succeeds", kick)])
+    return FailureIsRunning("until it succeeds", kick)
+
+
+def kick_at_goal(context: Context) -> Sequence:
+    """Return the subtree that kicks where there is a chance."""
+    sequence = Sequence("kick at goal", memory=False)
+    sequence.add_children([KickChance(context), line_up_and_kick(context)])
     return sequence

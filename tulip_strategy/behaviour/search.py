@@ -6,14 +6,21 @@ import math
 
 from py_trees.composites import Sequence
 
-from tulip_strategy.behaviour.base import ForSeconds
+from tulip_strategy.behaviour.base import Condition, ForSeconds
 from tulip_strategy.behaviour.context import Context
 from tulip_strategy.behaviour.gaze import look_at_ball, look_for_ball
 from tulip_strategy.behaviour.steering import towards
 
 
+def find_lost_ball(context: Context) -> Sequence:
+    """Return the subtree that runs while the ball is not known, and fails else."""
+    lost = Sequence("ball lost", memory=False)
+    lost.add_children([Condition("ball unknown", context, lambda c: not c.ball.known), find_ball(context)])
+    return lost
+
+
 def find_ball(context: Context) -> Sequence:
-    """Return the subtree."""
+    """Return the subtree that looks for the ball as a striker does: also by walking about."""
     parameters = context.parameters
     sequence = Sequence("find ball", memory=True)
     sequence.add_children(

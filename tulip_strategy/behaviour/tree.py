@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 from py_trees.behaviour import Behaviour
@@ -16,11 +15,16 @@ from tulip_strategy.behaviour.base import Act, Leaf
 from tulip_strategy.behaviour.context import Context
 from tulip_strategy.behaviour.dribble_and_kick import dribble_and_kick
 from tulip_strategy.behaviour.gaze import look_ahead, look_for_ball, track_ball
+from tulip_strategy.behaviour.goalkeeper import goalkeeper
 from tulip_strategy.behaviour.kick import KickUnderWay, ask_for_kick
-from tulip_strategy.behaviour.steering import limited, towards
+from tulip_strategy.behaviour.place import go_to
+from tulip_strategy.behaviour.steering import limited
 from tulip_strategy.interface import GamePhase, UserRequest
 
-STRATEGIES: dict[str, Callable[[Context], Behaviour]] = {"dribble_and_kick": dribble_and_kick}
+STRATEGIES: dict[str, Callable[[Context], Behaviour]] = {
+    "dribble_and_kick": dribble_and_kick,
+    "goalkeeper": goalkeeper,
+}
 """Strategies that a user can choose for PLAY, by name."""
 
 
@@ -124,16 +128,7 @@ def _go_to_place(context: Context) -> None:
         _stand_and_watch(context)
         return
     look_for_ball(context)
-    place = Pose2D(parameters.ready_x, parameters.ready_y, parameters.ready_yaw)
-    relative = context.world.robot.pose.inverse() @ place
-    way_left = math.hypot(relative.x, relative.y)
-    far = way_left > parameters.face_travel_distance
-    if way_left > parameters.place_tolerance:
-        context.walk(towards((relative.x, relative.y), way_left, relative.yaw, far, parameters))
-    elif abs(relative.yaw) > parameters.place_tolerance:
-        context.walk(limited((0.0, 0.0, parameters.heading_gain * relative.yaw), parameters))
-    else:
-        context.stand()
+    go_to(context, Pose2D(parameters.ready_x, parameters.ready_y, parameters.ready_yaw), parameters.place_tolerance)
 
 
 def _walk_test(context: Context) -> None:
