@@ -22,12 +22,14 @@ class Scenario:
         ball: x, y of the ball on the ground [m].
         keeper: The opponent's goalkeeper, or None.
         poles: Whether the field's landmark poles stand.
+        others: Poses of further robots, each with a body of its own.
     """
 
     robot: Pose2D
     ball: tuple[float, float]
     keeper: Keeper | None = None
     poles: bool = True
+    others: tuple[Pose2D, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that the numbers are finite.
@@ -35,7 +37,8 @@ class Scenario:
         Raises:
             ValueError: if one is not.
         """
-        for name, values in (("robot", (self.robot.x, self.robot.y, self.robot.yaw)), ("ball", self.ball)):
+        others = tuple(("others", (pose.x, pose.y, pose.yaw)) for pose in self.others)
+        for name, values in (("robot", (self.robot.x, self.robot.y, self.robot.yaw)), ("ball", self.ball), *others):
             if not all(math.isfinite(value) for value in values):
                 raise ValueError(f"{name} is {values}; expected finite numbers")
 

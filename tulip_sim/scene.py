@@ -35,6 +35,7 @@ KEEPER_SHADOW = 0.26  # [m]
 FOOT_SHADOW = 0.14  # [m]
 THREAD_GAP = 0.15  # [m] between two threads of a net
 UNSEEN = ("neck", "head")  # links that carry the camera; it does not see them
+HIDDEN = ("neck",)  # stands inside the head, where drawing from far to near knows no order
 
 
 @dataclass(frozen=True)
@@ -191,6 +192,7 @@ class Body:
         if robot.camera is None:
             raise ValueError(f"variant {robot.variant!r} has no camera; expected the playing variant")
         self._robot = robot
+        self._figures: dict[str, Body] = {}
         self._camera = robot.camera
         self._mount = mount or MountOffsets()
         self._soles = robot.soles
@@ -238,10 +240,24 @@ class Body:
         transforms[:, :3, 3] += np.einsum("bij,bj->bi", transforms[:, :3, :3], self._centres)
         return Boxes(transforms, self._sizes, self._colours)
 
+    def as_others_see_it(self, team_colour: str) -> Body:
+        """Return the body of such a robot in a team's colour, head and all, as others see it."""
+        if team_colour not in self._figures:
+            self._figures[team_colour] = Body(self._robot, team_colour, HIDDEN)
+        return self._figures[team_colour]
+
     def feet(self, links: dict[str, Array]) -> list[tuple[float, float]]:
         """Return x, y of both soles in map [m]."""
         places = [links[sole.link][:3, 3] + links[sole.link][:3, :3] @ np.array(sole.origin) for sole in self._soles]
         return [(float(place[0]), float(place[1])) for place in places]
+
+
+def _transform(position: Array, orientation: Array) -> Array:
+    """Return the (4, 4) transform of a place (3,) [m] and a quaternion (4,) x, y, z, w."""
+    transform = np.eye(4)
+    transform[:3, :3] = quaternion_matrix((orientation / np.linalg.norm(orientation)).tolist())
+    transform[:3, 3] = position
+    return transform
 
 
 def _cross_matrix(axis: Sequence[float]) -> Array:
@@ -256,14 +272,18 @@ def scene_of(truth: Truth, body: Body, keeper_colour: str) -> tuple[Scene, dict[
     Args:
         truth: The world.
         body: The robot's shape, with the parts that are to be seen.
-        keeper_colour: Of the keeper's markers.
+        keeper_colour: Of the markers of the keeper and of the other robots: opponents all.
     """
-    base = np.eye(4)
-    base[:3, :3] = quaternion_matrix((truth.base_orientation / np.linalg.norm(truth.base_orientation)).tolist())
-    base[:3, 3] = truth.base_position
-    links = body.links_in_map(base, truth.joint_positions)
+    links = body.links_in_map(_transform(truth.base_position, truth.base_orientation), truth.joint_positions)
     boxes = body.boxes(links)
     shadows = [(x, y, FOOT_SHADOW) for x, y in body.feet(links)]
+    figure = body.as_others_see_it(keeper_colour) if truth.others else body
+    for other in truth.others:
+        other_links = figure.links_in_map(
+            _transform(other.base_position, other.base_orientation), other.joint_positions
+        )
+        boxes = boxes + figure.boxes(other_links)
+        shadows += [(x, y, FOOT_SHADOW) for x, y in figure.feet(other_links)]
     if truth.keeper is not None:
         boxes = boxes + keeper_boxes(truth.keeper, keeper_colour)
         shadows.append((truth.keeper.x, truth.keeper.y, KEEPER_SHADOW))

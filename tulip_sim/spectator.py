@@ -12,14 +12,13 @@ from tulip_description.field import Field, Goal
 from tulip_description.planar import Pose2D
 from tulip_description.robot import Robot
 from tulip_sim.camera import CameraParameters, CameraRenderer
-from tulip_sim.scene import Body, scene_of
+from tulip_sim.scene import HIDDEN, Body, scene_of
 from tulip_sim.truth import Truth
 from tulip_vision.lens import Lens
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
-HIDDEN = ("neck",)  # stands inside the head, where drawing from far to near knows no order
 SAMPLES = 2  # per pixel, across and down: smooths what the renderer's own anti-aliasing leaves
 EXPOSURE = 1.2  # the head camera's pictures are a little dark for the page of a document
 

@@ -14,6 +14,26 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class OtherRobot:
+    """Another robot on the field, as it stands or lies; all in map.
+
+    Attributes:
+        base_position: (3,) of base_link [m].
+        base_orientation: (4,) quaternion x, y, z, w of base_link.
+        joint_positions: (14,) [rad], order of `tulip_description.robot.JOINTS`.
+    """
+
+    base_position: Array
+    base_orientation: Array
+    joint_positions: Array
+
+    @property
+    def footprint(self) -> Pose2D:
+        """base_footprint in map."""
+        return pose_on_ground(self.base_position, self.base_orientation)
+
+
+@dataclass(frozen=True)
 class Truth:
     """The state of the whole world at one instant; all in map unless said otherwise.
 
@@ -35,6 +55,7 @@ class Truth:
         body_touches: How often any other part of the robot has met the ball.
         keeper_touches: How often the keeper has met the ball.
         poles: Whether the landmark poles stand.
+        others: The other robots.
     """
 
     stamp: int
@@ -54,6 +75,7 @@ class Truth:
     body_touches: int
     keeper_touches: int
     poles: bool
+    others: tuple[OtherRobot, ...] = ()
 
     @property
     def footprint(self) -> Pose2D:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -79,19 +80,23 @@ def test_every_link_has_the_mass_com_and_inertia_of_the_model(variant: str) -> N
         pybullet.disconnect(client)
 
 
+def _dynamics(world: World, link: str) -> tuple[Any, ...]:
+    only = world.robots[0]
+    return tuple(pybullet.getDynamicsInfo(only.body, only.index[link], physicsClientId=world._client))
+
+
 def test_masses_are_spread_by_the_seed_within_the_range(make_world: MakeWorld) -> None:
     world = make_world(FAR, replace(EXACT, mass_spread=0.05), seed=3)
-    ratios = [
-        pybullet.getDynamicsInfo(world._body, world._index[link.name], physicsClientId=world._client)[0] / link.mass
-        for link in world.robot.links
-    ]
+    ratios = [_dynamics(world, link.name)[0] / link.mass for link in world.robot.links]
     assert 0.95 <= min(ratios) < 0.98 < 1.02 < max(ratios) <= 1.05
 
 
 def test_all_masses_and_inertias_are_scaled_alike(make_world: MakeWorld) -> None:
     world = make_world(FAR, replace(EXACT, mass_scale=1.1))
     for link in world.robot.links:
-        info = pybullet.getDynamicsInfo(world._body, world._index[link.name], physicsClientId=world._client)
+        info = pybullet.getDynamicsInfo(
+            world.robots[0].body, world.robots[0].index[link.name], physicsClientId=world._client
+        )
         assert info[0] == pytest.approx(1.1 * link.mass)
         np.testing.assert_allclose(info[2], 1.1 * np.array(link.inertia), rtol=1e-6)
 
@@ -366,9 +371,12 @@ def test_sensor_errors_are_off_in_the_exact_world() -> None:
 def test_accelerations_in_free_flight_equal_the_model(make_world: MakeWorld, variant: str) -> None:
     robot = load_robot(variant)
     world = make_world(FAR, EXACT, robot=robot)
-    base, _ = pybullet.getBasePositionAndOrientation(world._body, physicsClientId=world._client)
+    body = world.robots[0].body
+    base, _ = pybullet.getBasePositionAndOrientation(body, physicsClientId=world._client)
     turn = [0.1, -0.2, 0.3, np.sqrt(1 - 0.14)]
-    pybullet.resetBasePositionAndOrientation(world._body, [base[0], base[1], 3.0], turn, physicsClientId=world._client)
+    pybullet.resetBasePositionAndOrientation(
+        world.robots[0].body, [base[0], base[1], 3.0], turn, physicsClientId=world._client
+    )
     effort = np.array([1.0, -3.0, 4.0, -5.0, 2.0, 0.3, -1.0, 2.0, -6.0, 3.0, -1.0, -0.2])
     zero = np.zeros(12)
     world.apply(JointCommand(1, 0, LEG_JOINTS, zero, zero, effort, zero, zero))

@@ -1,0 +1,260 @@
+"""One robot of the simulated world: its body, its joints' driver, its sensors, and whom it touches."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from tulip_description import frames
+from tulip_description.model import floating_model
+from tulip_description.planar import Pose2D
+from tulip_description.quaternion import quaternion_matrix
+from tulip_description.robot import Robot
+from tulip_description.robot_io import JointCommand, Sensors
+from tulip_sim import bodies
+from tulip_sim.driver import MILLISECOND, JointDriver
+from tulip_sim.parameters import WorldParameters
+from tulip_sim.physics import pybullet
+from tulip_sim.sensors import BodyState, SensorModel, cell_forces
+from tulip_sim.touches import TouchCounter
+
+Array = NDArray[np.float64]
+
+
+class SimulatedRobot:
+    """A body in a physics engine, with what is its own: driver, sensor errors, masses and joint friction.
+
+    Attributes:
+        robot: What it is like, as motion control knows it.
+        body: Its number in the physics engine.
+        index: The engine's number of each link and joint, by name.
+        joint_positions, joint_velocities: (n,) after the last step of physics [rad], [rad/s].
+    """
+
+    def __init__(
+        self,
+        client: int,
+        robot: Robot,
+        parameters: WorldParameters,
+        start: Array,
+        pose: Pose2D,
+        carpet: int,
+        rng: tuple[np.random.Generator, np.random.Generator],
+    ) -> None:
+        """Load it, at rest, its soles on the ground; it holds its posture until the first commands come.
+
+        Args:
+            client: Physics engine.
+            robot: What to load.
+            parameters: Physics and sensors.
+            start: (n,) posture at the start [rad], feet flat.
+            pose: Of base_link in map, seen from above.
+            carpet: The ground's body, which the soles feel.
+            rng: Where its own masses and friction come from, and the errors of its sensors.
+
+        Raises:
+            ValueError: if start has a wrong shape or the feet of that posture are not level.
+        """
+        self.robot, self._client, self._parameters, self._carpet = robot, client, parameters, carpet
+        self._start, self._start_height = start, _base_height(robot, start)
+        p = parameters
+        physics_rng, sensor_rng = rng
+        spread = physics_rng.uniform(1.0 - p.mass_spread, 1.0 + p.mass_spread, len(robot.links))
+        self.body, self.index = bodies.add_robot(client, robot, p.mass_scale * spread)
+        self._joint_indices = [self.index[name] for name in robot.joint_names]
+        self._foot_links = tuple(self.index[sole.link] for sole in robot.soles)
+        self._com_in_base = np.array(robot.links[0].com)
+        n = len(self._joint_indices)
+        self._dry_friction = robot.effort_limits * physics_rng.uniform(*p.joint_friction, n)
+        self._place(pose)
+        self._driver = JointDriver(robot, p.driver, start)
+        self._effort = np.zeros(n)
+        self.joint_positions, self.joint_velocities = start.copy(), np.zeros(n)
+        self._push_force, self._push_end = np.zeros(3), 0
+        self._touches = {"left": TouchCounter(), "right": TouchCounter(), "body": TouchCounter()}
+        self._sensors = SensorModel(robot, p.sensors, sensor_rng, self._body_state(0))
+        self._delay = int(physics_rng.integers(p.sensor_delay[0], p.sensor_delay[1] + 1))  # [ms]
+        under_way = self._delay // p.sensors.period + 1
+        self._readings = deque([self._sensors.measure(self._body_state(0))], maxlen=under_way + 1)
+
+    @property
+    def foot_touches(self) -> tuple[int, int]:
+        """How often the left and the right foot have met the ball."""
+        return self._touches["left"].count, self._touches["right"].count
+
+    @property
+    def body_touches(self) -> int:
+        """How often any other part has met the ball."""
+        return self._touches["body"].count
+
+    def accept(self, command: JointCommand, now: int) -> str:
+        """Give a command to the driver at a time [ns]; return "" or the reason why it did not take it."""
+        return self._driver.accept(command, now)
+
+    def drive(self, now: int) -> None:
+        """Put the torques of the next millisecond on the joints, and a push on the trunk while there is one."""
+        self._effort = self._driver.torques(now, self.joint_positions, self.joint_velocities)
+        pybullet.setJointMotorControlArray(
+            self.body,
+            self._joint_indices,
+            pybullet.TORQUE_CONTROL,
+            forces=(self._effort - self._friction_torque()).tolist(),
+            physicsClientId=self._client,
+        )
+        if now < self._push_end:
+            com, _ = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
+            pybullet.applyExternalForce(
+                self.body, -1, self._push_force.tolist(), com, pybullet.WORLD_FRAME, physicsClientId=self._client
+            )
+
+    def read_joints(self) -> None:
+        """Take the joints' state after a step of physics."""
+        states = pybullet.getJointStates(self.body, self._joint_indices, physicsClientId=self._client)
+        self.joint_positions = np.array([state[0] for state in states])
+        self.joint_velocities = np.array([state[1] for state in states])
+
+    def measure(self, now: int) -> None:
+        """Read the sensors if a reading is due at this millisecond."""
+        if (now // MILLISECOND + self._delay) % self._parameters.sensors.period == 0:
+            self._readings.append(self._sensors.measure(self._body_state(now)))
+
+    def sensors(self, now: int) -> Sensors:
+        """Return the newest reading that has arrived by now."""
+        arrived = now - self._delay * MILLISECOND
+        while len(self._readings) > 1 and self._readings[1].stamp <= arrived:
+            self._readings.popleft()
+        return self._readings[0]
+
+    def count_touches(self, ball: int, now: int) -> None:
+        """Count what part of it has come to touch the ball in this step."""
+        touched = set()
+        for contact in pybullet.getContactPoints(self.body, ball, physicsClientId=self._client):
+            if contact[9] > 0.0:
+                touched.add({self._foot_links[0]: "left", self._foot_links[1]: "right"}.get(contact[3], "body"))
+        for part in touched:
+            self._touches[part].touch(now)
+
+    def push(self, force: ArrayLike, milliseconds: int, now: int) -> None:
+        """Push the trunk at its centre of mass with a force (3,) in map [N] for some milliseconds from now on.
+
+        Raises:
+            ValueError: if force is not three finite numbers or milliseconds is not positive.
+        """
+        vector = np.array(force, dtype=float)
+        if vector.shape != (3,) or not np.isfinite(vector).all() or milliseconds < 1:
+            raise ValueError(
+                f"force is {force!r} N for {milliseconds} ms; expected three finite numbers for 1 ms or more"
+            )
+        self._push_force, self._push_end = vector, now + milliseconds * MILLISECOND
+
+    def set_upright(self, pose: Pose2D | None, now: int) -> None:
+        """Set it on its feet in its start posture, at rest, and let go.
+
+        Args:
+            pose: Where base_link shall stand, in map; None for where it is, with the heading that it has.
+            now: The world's time [ns]; a push ends.
+
+        Raises:
+            ValueError: if a number is not finite.
+        """
+        if pose is None:
+            position, (_, _, z, w), _ = self.base_pose()
+            # Of all headings the one that takes the least turning from how the trunk lies.
+            pose = Pose2D(float(position[0]), float(position[1]), 2.0 * math.atan2(float(z), float(w)))
+        if not all(math.isfinite(value) for value in (pose.x, pose.y, pose.yaw)):
+            raise ValueError(f"robot shall stand at {pose}; expected finite numbers")
+        self._place(pose)
+        self._push_end = now
+        self.joint_positions, self.joint_velocities = self._start.copy(), np.zeros(len(self._start))
+
+    def base_pose(self) -> tuple[Array, Array, Array]:
+        """Return (3,) place [m], (4,) quaternion x, y, z, w and (3, 3) rotation of base_link in map."""
+        com, orientation = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
+        quaternion = np.array(orientation)
+        rotation = quaternion_matrix(orientation)
+        return np.array(com) - rotation @ self._com_in_base, quaternion, rotation
+
+    def base_velocity(self, rotation: Array) -> tuple[Array, Array]:
+        """Return (3,) velocity [m/s] and (3,) angular velocity [rad/s] of base_link in map, given its rotation."""
+        linear, angular = pybullet.getBaseVelocity(self.body, physicsClientId=self._client)
+        x, y, z = (rotation @ self._com_in_base).tolist()
+        wx, wy, wz = angular
+        vx, vy, vz = linear
+        lever = (vx - wy * z + wz * y, vy - wz * x + wx * z, vz - wx * y + wy * x)
+        return np.array(lever), np.array(angular)
+
+    def _place(self, pose: Pose2D) -> None:
+        client = self._client
+        turn = np.array([0.0, 0.0, math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)])
+        base = np.array([pose.x, pose.y, self._start_height])
+        com = (
+            base + quaternion_matrix(turn.tolist()) @ self._com_in_base
+        )  # pybullet places the CoM, not the link's frame
+        pybullet.resetBasePositionAndOrientation(self.body, com.tolist(), turn.tolist(), physicsClientId=client)
+        pybullet.resetBaseVelocity(self.body, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], physicsClientId=client)
+        for index, angle in zip(self._joint_indices, self._start, strict=True):
+            pybullet.resetJointState(self.body, index, float(angle), 0.0, physicsClientId=client)
+
+    def _friction_torque(self) -> Array:
+        torque: Array = self._dry_friction * np.tanh(self.joint_velocities / self._parameters.joint_friction_speed)
+        return torque
+
+    def _body_state(self, now: int) -> BodyState:
+        position, orientation, rotation = self.base_pose()
+        linear, angular = self.base_velocity(rotation)
+        return BodyState(
+            stamp=now,
+            joint_positions=self.joint_positions,
+            joint_velocities=self.joint_velocities,
+            joint_efforts=self._effort,
+            base_position=position,
+            base_orientation=orientation,
+            base_rotation=rotation,
+            base_linear_velocity=linear,
+            base_angular_velocity=angular,
+            foot_cells=self._foot_cells(),
+        )
+
+    def _foot_cells(self) -> Array:
+        """Return (2, 4) forces on the cells [N], from the contacts of the soles with the carpet."""
+        contacts = pybullet.getContactPoints(self.body, self._carpet, physicsClientId=self._client)
+        cells = np.zeros((2, 4))
+        for side, link in enumerate(self._foot_links):
+            own = [(contact[5], contact[9]) for contact in contacts if contact[3] == link and contact[9] > 0.0]
+            if not own:
+                continue
+            state = pybullet.getLinkState(self.body, link, physicsClientId=self._client)
+            (ox, oy, oz), (x, y, z, w) = state[4], state[5]
+            forward = (1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w))  # the sole's axes in map
+            left = (2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w))
+            sole_x, sole_y, _ = self.robot.soles[side].origin
+            places = []
+            for (px, py, pz), force in own:
+                dx, dy, dz = px - ox, py - oy, pz - oz
+                along = dx * forward[0] + dy * forward[1] + dz * forward[2]
+                across = dx * left[0] + dy * left[1] + dz * left[2]
+                places.append((along - sole_x, across - sole_y, force))
+            cells[side] = cell_forces(self.robot.feet[side], places)
+        return cells
+
+
+def _base_height(robot: Robot, joints: Array) -> float:
+    """Return the height of base_link with an upright trunk and the soles on the ground."""
+    if joints.shape != (len(robot.joint_names),):
+        raise ValueError(f"joint_positions has shape {joints.shape}; expected ({len(robot.joint_names)},)")
+    model = floating_model(robot)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, np.concatenate([[0, 0, 0, 0, 0, 0, 1], joints]))
+    soles = [data.oMf[model.getFrameId(name)] for name in (frames.LEFT_SOLE, frames.RIGHT_SOLE)]
+    heights = [float(sole.translation[2]) for sole in soles]
+    if abs(heights[0] - heights[1]) > 1e-3 or any(sole.rotation[2, 2] < math.cos(0.01) for sole in soles):
+        raise ValueError(
+            f"joint_positions put the soles at {heights} m below base_link, tilts"
+            f" {[round(math.acos(min(sole.rotation[2, 2], 1.0)), 3) for sole in soles]} rad;"
+            " expected level soles of equal height with an upright trunk"
+        )
+    return -min(heights)
