@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tulip_description.field import Field, Goal
 from tulip_description.keeper import KeeperPart, keeper_parts
+from tulip_description.planar import Pose2D
 from tulip_description.robot import Box, Robot, realizable_inertia
 from tulip_description.urdf import build_urdf
 from tulip_sim.keeper import Keeper
@@ -133,13 +134,12 @@ def add_keeper(client: int, keeper: Keeper) -> int:
     """Add the keeper's figure. It has no mass, so nothing pushes it away; `move_keeper` moves it."""
     shape = _boxes(client, [part for part in keeper_parts() if part.solid])
     body = _static(client, shape, friction=0.5)
-    move_keeper(client, body, keeper, 0)
+    move_keeper(client, body, keeper.pose)
     return body
 
 
-def move_keeper(client: int, body: int, keeper: Keeper, stamp: int) -> None:
-    """Put the keeper where its path says."""
-    pose = keeper.pose_at(stamp)
+def move_keeper(client: int, body: int, pose: Pose2D) -> None:
+    """Put the keeper at a pose in map."""
     turn = [0.0, 0.0, math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)]
     pybullet.resetBasePositionAndOrientation(body, [pose.x, pose.y, 0.0], turn, physicsClientId=client)
 

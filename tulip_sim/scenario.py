@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,6 +47,7 @@ BALL_DISTANCE = (0.5, 3.0)  # [m] from the robot
 HEADING_SPREAD = math.radians(45.0)  # to either side of the direction to the goal
 LINE_MARGIN = 0.3  # [m] the ball starts this far inside the outer lines at least
 KEEPER_AHEAD = 0.3  # [m] in front of the goal line
+KEEPER_HALF_WIDTH = 0.3  # [m] of the figure
 KEEPER_OFF_CENTRE = (0.25, 0.75)  # [m] to either side
 
 
@@ -71,6 +72,13 @@ def random_trial(rng: np.random.Generator, field: Field) -> Scenario:
     return Scenario(robot, ball, keeper, poles=bool(field.poles))
 
 
+def trial_against_moving_keeper(rng: np.random.Generator, field: Field) -> Scenario:
+    """Return a random trial whose keeper follows the ball along the goal line, from post to post."""
+    trial = random_trial(rng, field)
+    assert trial.keeper is not None
+    return replace(trial, keeper=replace(trial.keeper, follows=0.5 * field.goal_width - KEEPER_HALF_WIDTH))
+
+
 def open_play(rng: np.random.Generator, field: Field) -> Scenario:
     """Return the robot in its own half with the ball a metre before it, and no opponent."""
     return Scenario(Pose2D(-2.0, 0.0, 0.0), (-1.0, 0.0), poles=bool(field.poles))
@@ -78,6 +86,7 @@ def open_play(rng: np.random.Generator, field: Field) -> Scenario:
 
 SCENARIOS: dict[str, Callable[[np.random.Generator, Field], Scenario]] = {
     "trial": random_trial,
+    "trial_moving_keeper": trial_against_moving_keeper,
     "open": open_play,
 }
 """Scenarios by name."""

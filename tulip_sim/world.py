@@ -73,6 +73,7 @@ class World:
             bodies.add_poles(self._client, self.field)
         self._ball = bodies.add_ball(self._client, self.field.ball_radius, self.friction, p)
         self._keeper = None if scenario.keeper is None else bodies.add_keeper(self._client, scenario.keeper)
+        self._keeper_pose = None if scenario.keeper is None else scenario.keeper.pose
         self._keeper_touches = TouchCounter()
         robots = []
         for index, pose in enumerate((scenario.robot, *scenario.others)):
@@ -104,12 +105,11 @@ class World:
         """
         if milliseconds < 0:
             raise ValueError(f"milliseconds is {milliseconds}; expected >= 0")
-        client, keeper = self._client, self.scenario.keeper
+        client = self._client
         for _ in range(milliseconds):
             for robot in self.robots:
                 robot.drive(self._now)
-            if self._keeper is not None and keeper is not None and keeper.path:
-                bodies.move_keeper(client, self._keeper, keeper, self._now)
+            self._move_keeper()
             pybullet.stepSimulation(physicsClientId=client)
             self._now += MILLISECOND
             for robot in self.robots:
@@ -148,7 +148,7 @@ class World:
             ball_orientation=np.array(ball_orientation),
             ball_linear_velocity=np.array(ball_linear),
             ball_angular_velocity=np.array(ball_angular),
-            keeper=None if keeper is None else keeper.pose_at(self._now),
+            keeper=self._keeper_pose,
             keeper_path=() if keeper is None or not keeper.path else keeper.points,
             foot_touches=own.foot_touches,
             body_touches=own.body_touches,
@@ -205,6 +205,19 @@ class World:
     def close(self) -> None:
         """Free the physics engine; the world cannot be used afterwards."""
         self._finalizer()
+
+    def _move_keeper(self) -> None:
+        """Put the keeper's figure where it is in the next millisecond."""
+        keeper, pose = self.scenario.keeper, self._keeper_pose
+        if keeper is None or pose is None or self._keeper is None or not keeper.moves:
+            return
+        if keeper.path:
+            pose = keeper.pose_at(self._now + MILLISECOND)
+        else:
+            position, _ = pybullet.getBasePositionAndOrientation(self._ball, physicsClientId=self._client)
+            pose = keeper.after(pose, position[1], 1e-3)
+        self._keeper_pose = pose
+        bodies.move_keeper(self._client, self._keeper, pose)
 
     def _count_touches(self) -> None:
         """Count who has come to touch the ball in this step."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from tulip_motion.gaze import GazeParameters
 from tulip_motion.parameters import MotionParameters
 
-_SIGNED = frozenset({"ready_x", "ready_y", "ready_yaw", "dribble_lateral"})
+_SIGNED = frozenset({"ready_x", "ready_y", "ready_yaw", "dribble_lateral", "throw_target_x", "throw_target_y"})
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,7 @@ class StrategyParameters(GazeParameters):
     kick_start_limit: float = 3.0  # [s] no kick has begun by then: it was refused
     kick_run_limit: float = 8.0  # [s] a kick lasts about 3 s; longer means that its end was not reported
     kick_speed: float = 3.0  # [m/s] wanted of the ball
+    kick_least_speed: float = 1.0  # [m/s] of a pass; a slower foot moves the ball by chance
     kick_direction_limit: float = 0.2  # [rad] farther sideways the foot cannot swing
     kick_outward_slope: float = 3.0  # [rad/m] less of it outwards where the other foot stands in the way of the run-up
     kick_range: float = 3.5  # [m] ball to goal; farther, 5 deg of error miss the gap
@@ -81,9 +82,21 @@ class StrategyParameters(GazeParameters):
 
     # Aim.
     opponent_radius: float = 0.30  # [m] keeper's half width and a step to the side
+    opponent_speed: float = 0.2  # [m/s] at which a keeper follows a shot
+    shot_mean_speed: float = 2.3  # [m/s] of a kicked ball over the last metres before the goal
+    stuck_distance: float = 0.9  # [m] a ball this near an opponent that leaves no gap is passed sideways
+    stuck_turn: float = math.radians(100.0)  # [rad] off the direction to that opponent
+    stuck_pass: float = 1.2  # [m]
     aim_time: float = 2.0  # [s] smoothing of the aim point: estimates of keeper and pose jitter
     aim_jump: float = 2.0  # [m] of the aim point in odom: localization found its place anew, so it is taken at once
     gap_preference: float = 1.25  # another gap has to be this much wider to change the side
+
+    # Looking at the keeper that one shoots past.
+    keeper_glance_ball: float = 1.5  # [m] with the ball nearer than this
+    keeper_glance_range: float = 5.0  # [m] and no farther than this from the goal
+    keeper_glance_age: float = 1.0  # [s] a keeper unseen for so long may have moved by the goal's free part
+    keeper_glance_time: float = 0.8  # [s] of looking: way of the head, and three or four pictures
+    keeper_glance_pause: float = 2.5  # [s] for the ball in between
 
     # Ball lost and found.
     ball_lost_age: float = 5.0  # [s] unseen: a resting ball stays where it was while the way round turns the back on it
@@ -113,6 +126,13 @@ class StrategyParameters(GazeParameters):
     keeper_clear_depth: float = 1.6  # [m] from the goal line, the ball is the keeper's
     keeper_clear_margin: float = 0.4  # [m] farther once it goes for it
     keeper_clear_reach: float = 4.0  # [m] how far away the point lies that a cleared ball is sent to
+
+    # Technical challenges.
+    throw_target_x: float = 0.0  # [m] in map, where a ball thrown in shall come to rest
+    throw_target_y: float = 0.0  # [m]
+    course_clearance: float = (
+        0.75  # [m] of the dribbled ball from an obstacle's middle: it, and the robot behind the ball
+    )
 
     # Game.
     game_state_limit: float = 30.0  # [s] no referee packet for so long: stand; shorter gaps are lost packets
@@ -146,6 +166,7 @@ class StrategyParameters(GazeParameters):
             ("standoff", "behind_reach"),
             ("kick_range", "kick_range_end"),
             ("kick_gap_end", "kick_gap"),
+            ("kick_least_speed", "kick_speed"),
             ("kick_window_growth", "kick_settle_growth"),
             ("ball_found_age", "ball_lost_age"),
         ):

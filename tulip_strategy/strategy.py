@@ -11,7 +11,7 @@ from tulip_motion.interface import HeadCommand, HeadMode, MotionState, WalkComma
 from tulip_strategy.behaviour.context import Context
 from tulip_strategy.behaviour.steering import STILL, Acceleration
 from tulip_strategy.behaviour.tree import build_tree
-from tulip_strategy.interface import Decision, GameState, UserCommand
+from tulip_strategy.interface import Decision, GamePhase, GameState, UserCommand
 from tulip_strategy.parameters import StrategyParameters
 from tulip_worldmodel.world_state import WorldState
 
@@ -48,11 +48,12 @@ class Strategy:
         elapsed = 0.0 if self._last_stamp is None else (stamp - self._last_stamp) * 1e-9
         context.dt = min(LONGEST_GAP, max(0.0, elapsed))
         self._last_stamp = stamp
-        context.stamp, context.world, context.game = stamp, world, game
+        context.stamp, context.game = stamp, game
         context.user, context.motion = user, motion
+        if game is None or game.phase is not GamePhase.PLAYING:
+            context.kicks = 0
         context.clear_wish()
-        if world is not None:
-            context.ball.update(world)
+        context.see(world)
         self._tree.tick_once()
         return Decision(stamp, self._walk(), self._head(), context.kick, active_path(self._tree))
 

@@ -46,6 +46,7 @@ class OpponentParameters:
     forgotten: float = 0.05  # confidence at which it is given up
     missed_time: float = 0.6  # [s] in which confidence falls by e while it should be visible but is not
     hidden_time: float = 15.0  # [s] in which confidence falls by e while nobody looks
+    marker_height: float = 0.95  # [m] of the team marker's middle: what vision must see to find anybody
     visible_range: float = 5.0  # [m] up to which vision is expected to find it
     view_margin: float = math.radians(5.0)  # [rad] from the picture's edge, where it may be cut
 
@@ -186,7 +187,8 @@ class OpponentFilter:
 
     def _miss(self, opponent: Opponent, features: Features, observer: Observer, since_last: float) -> None:
         p = self._parameters
-        angles, _ = observer.direction(opponent.point.state[:2], GROUND)
+        # Of somebody close by, a camera that looks down sees the feet only, and vision knows nobody by the feet.
+        angles, _ = observer.direction(opponent.point.state[:2], p.marker_height)
         near = np.linalg.norm(observer.offset(opponent.point.state[:2], GROUND)[0]) < p.visible_range
         expected = near and in_view(features, angles, p.view_margin)
         opponent.confidence *= math.exp(-since_last / (p.missed_time if expected else p.hidden_time))

@@ -71,7 +71,8 @@ def goes_in(shot: Shot, field: Field, seed: int, figure: Pose2D | None) -> bool:
 def is_in(ball: np.ndarray, field: Field) -> bool:
     """Tell whether the ball, (3,) in map [m], lies in the own goal."""
     goal = field.own_goal
-    return goal.outward * (ball[0] - goal.x) > field.ball_radius and abs(ball[1]) < 0.5 * goal.width
+    beyond = goal.outward * (float(ball[0]) - goal.x)
+    return beyond > field.ball_radius and abs(float(ball[1])) < 0.5 * goal.width
 
 
 def keep(shot: Shot, seed: int, settings: Settings | None = None) -> tuple[bool, bool, int]:

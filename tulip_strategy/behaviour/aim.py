@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from tulip_description.field import Field
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_strategy.parameters import StrategyParameters
-from tulip_worldmodel.world_state import WorldState
+from tulip_worldmodel.world_state import ObjectEstimate, WorldState
 
 Point = tuple[float, float]
 
@@ -43,6 +43,7 @@ def free_gaps(
     obstacles: Iterable[Point],
     obstacle_radius: float,
     ball_radius: float,
+    obstacle_reach: float = 0.0,
 ) -> tuple[Gap, ...]:
     """Return the directions in which the ball passes into the goal, from right to left.
 
@@ -55,6 +56,7 @@ def free_gaps(
         obstacles: Where opponents stand [m]; those farther away than the goal block nothing.
         obstacle_radius: [m].
         ball_radius: [m].
+        obstacle_reach: How far an opponent moves while the ball rolls a metre [m/m].
     """
     left_post, right_post = posts
     middle = (0.5 * (left_post[0] + right_post[0]), 0.5 * (left_post[1] + right_post[1]))
@@ -72,7 +74,7 @@ def free_gaps(
     for point in obstacles:
         if math.dist(ball, point) > goal_distance + obstacle_radius:
             continue
-        direction, half = seen(point, obstacle_radius)
+        direction, half = seen(point, obstacle_radius + obstacle_reach * math.dist(ball, point))
         cut = []
         for low, high in free:
             cut += [(low, min(high, direction - half)), (max(low, direction + half), high)]
@@ -106,6 +108,7 @@ class Aim:
         direction: From the ball to the point, in base_footprint [rad].
         gap: Free angle round it [rad], 0 without a free gap.
         distance: Ball to the middle of the goal, or to the point [m].
+        speed: That a kicked ball shall have [m/s].
     """
 
     def __init__(self, parameters: StrategyParameters, field: Field) -> None:
@@ -115,33 +118,51 @@ class Aim:
         self.direction = 0.0
         self.gap = 0.0
         self.distance = math.inf
+        self.speed = parameters.kick_speed
 
-    def at_point(self, world: WorldState, ball: Point, point: Point, dt: float) -> None:
-        """Aim at a point of map [m], `dt` [s] after the last time; `ball` is in base_footprint [m]."""
+    def at_point(self, world: WorldState, ball: Point, point: Point, dt: float, speed: float = math.inf) -> None:
+        """Aim at a point.
+
+        Args:
+            world: Newest world state.
+            ball: In base_footprint [m].
+            point: In map [m].
+            dt: Since the last time [s].
+            speed: Of a kicked ball [m/s], brought within what kicks can do.
+        """
+        p = self._parameters
         relative = world.robot.pose.inverse().transform(point)
-        self.distance, self.gap = math.dist(ball, relative), math.pi
+        self.distance, self.gap = math.dist(ball, relative), 0.0
+        self.speed = min(p.kick_speed, max(p.kick_least_speed, speed))
         odom = world.robot.pose_in_odom
         self._point_in_odom = self._smoothed(odom.transform(relative), dt)
         self.direction = self._direction(odom, ball, self._point_in_odom)
 
-    def at_goal(self, world: WorldState, ball: Point, dt: float) -> None:
+    def at_goal(self, world: WorldState, ball: Point, opponents: Iterable[ObjectEstimate], dt: float) -> None:
         """Aim at the free part of the goal that is widest, as ball and opponents are relative to the robot now."""
-        goal = self._field.opponent_goal
+        p, goal = self._parameters, self._field.opponent_goal
+        self.speed = p.kick_speed
         robot, odom = world.robot.pose, world.robot.pose_in_odom
         to_robot = robot.inverse()
         left, right = (to_robot.transform((post.x, post.y)) for post in goal.posts)
         middle = to_robot.transform((goal.x, 0.0))
         self.distance = math.dist(ball, middle)
-        opponents = [(float(seen.position[0]), float(seen.position[1])) for seen in world.opponents]
-        in_front = [point for point in opponents if math.dist(ball, point) < self.distance + 0.5]
+        places = [(float(seen.position[0]), float(seen.position[1])) for seen in opponents]
+        in_front = [point for point in places if math.dist(ball, point) < self.distance + 0.5]
         gaps = free_gaps(
             ball,
             (left, right),
             goal.posts[0].radius,
             in_front or [middle],  # a keeper not seen yet most likely stands in the middle
-            self._parameters.opponent_radius,
+            p.opponent_radius,
             self._field.ball_radius,
+            p.opponent_speed / p.shot_mean_speed,
         )
+        if not gaps and in_front:
+            nearest = min(in_front, key=lambda point: math.dist(ball, point))
+            if math.dist(ball, nearest) < p.stuck_distance:
+                self._out_of_the_way(world, ball, nearest, middle, dt)
+                return
         previous = None if self._point_in_odom is None else self._direction(odom, ball, self._point_in_odom)
         gap = choose_gap(gaps, previous, self._parameters.gap_preference)
         self.gap = 0.0 if gap is None else gap.width
@@ -149,6 +170,20 @@ class Aim:
         point = odom.transform(to_robot.transform((goal.x, across)))
         self._point_in_odom = self._smoothed(point, dt)
         self.direction = self._direction(odom, ball, self._point_in_odom)
+
+    def _out_of_the_way(self, world: WorldState, ball: Point, opponent: Point, goal: Point, dt: float) -> None:
+        """Aim sideways, for a short pass past an opponent at whose feet the ball lies.
+
+        The robot then stands beside the ball, off the opponent; of both sides it is the one that takes less of a way.
+        """
+        p = self._parameters
+        blocked = math.atan2(opponent[1] - ball[1], opponent[0] - ball[0])
+        present = math.atan2(ball[1], ball[0])
+        turns = [p.stuck_turn, -p.stuck_turn]
+        best = blocked + min(turns, key=lambda turn: abs(wrap_angle(blocked + turn - present)))
+        place = (ball[0] + p.stuck_pass * math.cos(best), ball[1] + p.stuck_pass * math.sin(best))
+        self.at_point(world, ball, world.robot.pose.transform(place), dt, 0.0)
+        self.distance, self.gap = math.dist(ball, goal), p.kick_gap
 
     def _crossing(self, robot: Pose2D, ball: Point, direction: float) -> float:
         """Return y in map [m] where a ray from the ball crosses the goal line, kept between the posts."""

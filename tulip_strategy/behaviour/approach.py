@@ -71,8 +71,7 @@ class Approach(Leaf):
     def _round_opponents(self, waypoint: Point) -> Point:
         """Return a waypoint beside the nearest opponent that stands in the way, else the waypoint itself."""
         clearance = self.context.parameters.opponent_clearance
-        world = self.context.world
-        opponents = [] if world is None else [(float(o.position[0]), float(o.position[1])) for o in world.opponents]
+        opponents = [(float(each.position[0]), float(each.position[1])) for each in self.context.opponents]
         for opponent in sorted(opponents, key=lambda point: math.hypot(*point)):
             at_target = math.dist(opponent, waypoint) < clearance
             if not at_target and distance_to_way(opponent, (0.0, 0.0), waypoint) < clearance:

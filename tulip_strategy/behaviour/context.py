@@ -7,10 +7,11 @@ from tulip_description.robot import load_robot
 from tulip_motion.gaze import GazePlanner
 from tulip_motion.interface import HeadMode, KickGoal, MotionState, WalkMode
 from tulip_strategy.behaviour.aim import Aim
+from tulip_strategy.behaviour.keeper_glance import KeeperGlance
 from tulip_strategy.behaviour.steering import STILL, Velocity
 from tulip_strategy.interface import GameState, UserCommand, UserRequest
 from tulip_strategy.parameters import StrategyParameters
-from tulip_worldmodel.world_state import WorldState
+from tulip_worldmodel.world_state import ObjectEstimate, WorldState
 
 Point = tuple[float, float]
 Point3 = tuple[float, float, float]
@@ -61,9 +62,12 @@ class Context:
         dt: Since the last decision [s].
         world, game, user, motion: Inputs.
         ball, aim: What follows from them.
+        opponents: Those that stand on the carpet; others are none.
         gaze: Shares the gaze between ball and landmarks.
+        keeper_glance: Looks at the other goal's keeper now and then.
         kick_sent: When the running kick was asked for [ns], None without one.
         kick_seen: Whether motion control has reported it.
+        kicks: How many kicks have ended since play began.
         mode, velocity, head, target, glance, kick: The wish, see `Decision`.
         sudden: Whether the velocity counts at once, as a shot demands, and not within the limits of acceleration.
     """
@@ -79,10 +83,26 @@ class Context:
         self.motion: MotionState | None = None
         self.ball = BallMemory(parameters)
         self.aim = Aim(parameters, field)
+        self.opponents: tuple[ObjectEstimate, ...] = ()
         self.gaze = GazePlanner(parameters, field, load_robot())
+        self.keeper_glance = KeeperGlance(parameters, field)
         self.kick_sent: int | None = None
         self.kick_seen = False
+        self.kicks = 0
         self.clear_wish()
+
+    def see(self, world: WorldState | None) -> None:
+        """Take the newest world state."""
+        self.world = world
+        if world is None:
+            return
+        self.ball.update(world)
+        reach = 0.5 * self.field.carpet_length, 0.5 * self.field.carpet_width
+        self.opponents = tuple(
+            each
+            for each in world.opponents
+            if all(abs(at) < most for at, most in zip(each.position_in_map, reach, strict=True))
+        )
 
     def clear_wish(self) -> None:
         """Forget the last wish: stand and hold the head."""

@@ -28,4 +28,4 @@ def dribble_and_kick(context: Context) -> Sequence:
 def aim_at_goal(context: Context) -> None:
     """Aim at the free part of the goal, if the ball's place is known."""
     if context.world is not None and context.ball.position is not None:
-        context.aim.at_goal(context.world, context.ball.position, context.dt)
+        context.aim.at_goal(context.world, context.ball.position, context.opponents, context.dt)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from tulip_motion.interface import GazeInput, HeadMode
-from tulip_strategy.behaviour.context import Context
+from tulip_strategy.behaviour.context import Context, Point3
 
 
 def look_ahead(context: Context) -> None:
@@ -32,8 +34,20 @@ def track_ball(context: Context) -> None:
         return
     look_at_ball(context)
     context.head = HeadMode.TRACK
+    context.glance = _towards_keeper(context)
+    if context.glance is not None:
+        return
     known = gaze_input(context)
     context.glance = None if known is None else context.gaze.plan(known)
+
+
+def _towards_keeper(context: Context) -> Point3 | None:
+    """Return where to glance to see the keeper, in base_footprint, or None where that is not of use now."""
+    world, ball = context.world, context.ball.position
+    near = ball is not None and math.hypot(*ball) < context.parameters.keeper_glance_ball
+    if world is None or not near or context.aim.distance > context.parameters.keeper_glance_range:
+        return None
+    return context.keeper_glance.point(context.stamp, world.robot.pose, context.opponents)
 
 
 def gaze_input(context: Context) -> GazeInput | None:

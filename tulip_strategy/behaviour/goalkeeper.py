@@ -115,7 +115,7 @@ class NearBall(Leaf):
         if abs(x - goal.x) > parameters.keeper_clear_depth + more or abs(y) > 0.5 * goal.width + 1.0 + more:
             return False
         own = math.hypot(*ball.position)
-        others = [math.dist(ball.position, tuple(each.position)) for each in world.opponents]
+        others = [math.dist(ball.position, tuple(each.position)) for each in context.opponents]
         return all(own < other + more for other in others)
 
 
@@ -180,7 +180,7 @@ def aim_outwards(context: Context) -> None:
     x, y = pose.transform(ball)
     straight = math.atan2(y, x - goal.x)  # from the middle of the goal through the ball
     present = pose.yaw + math.atan2(ball[1], ball[0])
-    opponents = [pose.transform(tuple(each.position)) for each in world.opponents]
+    opponents = [pose.transform(tuple(each.position)) for each in context.opponents]
     at = [math.atan2(oy - y, ox - x) for ox, oy in opponents]
 
     def cost(direction: float) -> float:

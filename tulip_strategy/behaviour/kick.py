@@ -151,7 +151,7 @@ class Strike(Leaf):
             # The nearer the ball lies to the other foot, the less the run-up may come from there.
             room += parameters.kick_outward_slope * (outward * ball[1] - parameters.kick_lateral)
         direction = outward * max(-limit, min(limit, room, outward * context.aim.direction))
-        ask_for_kick(context, KickGoal(self._foot.side, direction, parameters.kick_speed, ball=ball))
+        ask_for_kick(context, KickGoal(self._foot.side, direction, context.aim.speed, ball=ball))
         return Status.SUCCESS
 
 
@@ -184,6 +184,7 @@ class KickUnderWay(Leaf):
         limit = parameters.kick_run_limit if context.kick_seen else parameters.kick_start_limit
         if ended or waited > limit:
             context.kick_sent = None
+            context.kicks += context.kick_seen
             return Status.FAILURE
         context.stand()
         look_at_ball(context)

@@ -14,16 +14,20 @@ from tulip_motion.interface import KickGoal, MotionMode, Side, WalkMode
 from tulip_strategy.behaviour.base import Act, Leaf
 from tulip_strategy.behaviour.context import Context
 from tulip_strategy.behaviour.dribble_and_kick import dribble_and_kick
+from tulip_strategy.behaviour.dribble_course import dribble_course
 from tulip_strategy.behaviour.gaze import look_ahead, look_for_ball, track_ball
 from tulip_strategy.behaviour.goalkeeper import goalkeeper
 from tulip_strategy.behaviour.kick import KickUnderWay, ask_for_kick
 from tulip_strategy.behaviour.place import go_to
 from tulip_strategy.behaviour.steering import limited
+from tulip_strategy.behaviour.throw_in import throw_in
 from tulip_strategy.interface import GamePhase, UserRequest
 
 STRATEGIES: dict[str, Callable[[Context], Behaviour]] = {
     "dribble_and_kick": dribble_and_kick,
     "goalkeeper": goalkeeper,
+    "throw_in": throw_in,
+    "dribble_course": dribble_course,
 }
 """Strategies that a user can choose for PLAY, by name."""
 
@@ -35,7 +39,7 @@ def build_tree(context: Context) -> Behaviour:
         [
             _when("limp", context, _wants(UserRequest.LIMP), Act("stay limp", context, _limp)),
             _when("user stops", context, _wants(UserRequest.STOP, UserRequest.STAND), Act("stand", context, _rest)),
-            _when("fallen", context, _is_fallen, Act("stay down", context, _limp)),
+            _when("fallen", context, _is_fallen, Act("stay down", context, _stay_down)),
             KickUnderWay(context),
             _when("walk test", context, _wants(UserRequest.WALK_TEST), Act("walk", context, _walk_test)),
             _when("kick test", context, _wants(UserRequest.KICK_TEST), KickTest(context)),
@@ -110,6 +114,12 @@ def _without_referee(context: Context) -> bool:
 
 def _limp(context: Context) -> None:
     context.mode = WalkMode.LIMP
+
+
+def _stay_down(context: Context) -> None:
+    """Lie limp; a robot that was taken out of play stands up as soon as people have set it upright."""
+    taken_out = context.game is not None and context.game.penalty != 0
+    context.mode = WalkMode.STAND if taken_out else WalkMode.LIMP
 
 
 def _rest(context: Context) -> None:
