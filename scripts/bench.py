@@ -30,14 +30,14 @@ from tulip_sim.bench import (
     localization,
     odometry,
     push,
+    strategy,
     stress,
-    trial,
     vision,
     walk,
 )
 from tulip_sim.bench.runner import Row, run, save, write_results
 
-MODULES = (trial, walk, push, kick, odometry, control, ilc, clik, stress, vision, localization, ball, head, latency)
+MODULES = (strategy, walk, push, kick, odometry, control, ilc, clik, stress, vision, localization, ball, head, latency)
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"
 

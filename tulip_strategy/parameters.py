@@ -130,9 +130,7 @@ class StrategyParameters(GazeParameters):
     # Technical challenges.
     throw_target_x: float = 0.0  # [m] in map, where a ball thrown in shall come to rest
     throw_target_y: float = 0.0  # [m]
-    course_clearance: float = (
-        0.75  # [m] of the dribbled ball from an obstacle's middle: it, and the robot behind the ball
-    )
+    course_clearance: float = 0.75  # [m] of the dribbled ball from an obstacle's middle: room for the robot behind
 
     # Game.
     game_state_limit: float = 30.0  # [s] no referee packet for so long: stand; shorter gaps are lost packets

@@ -9,13 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from tulip_sim.bench import ilc, kick, push, stress, trial, walk
+from tulip_sim.bench import ilc, kick, push, strategy, stress, walk
 from tulip_sim.bench.runner import Bench, Row, run, save, write_results
 
-BENCHES = (trial.BENCH, walk.BENCH, push.BENCH, kick.BENCH, ilc.BENCH, stress.BENCH)
+BENCHES = (strategy.BENCH, walk.BENCH, push.BENCH, kick.BENCH, ilc.BENCH, stress.BENCH)
 
 TRIAL_ROWS: list[Row] = [
     {
+        "part": "standing",
         "seed": seed,
         "outcome": outcome,
         "time [s]": duration,
@@ -84,16 +85,33 @@ KICK_ROWS: list[Row] = [
 ]
 
 
-def test_trials_are_counted_and_listed() -> None:
-    text = "\n".join(trial.summarize(TRIAL_ROWS))
-    assert "goals: 2 of 3; median time to goal 30 s" in text
-    assert "falls: 3" in text
+def test_trials_are_counted_and_those_without_a_goal_named() -> None:
+    text = "\n".join(strategy.summarize(TRIAL_ROWS))
+    line = "| keeper's figure stands off-centre | 2 of 3 | 95 of 100 | 3 | 30 s, 38 s | fallen (seed 2) |"
+    assert line in text
     assert "median of the trials' RMS: 0.200 m, 2.0 deg" in text
-    assert "| 2 | fallen | 60.0 s | 5 | 2 | 3.0 m | 0.300 m, 2.0 deg |" in text
 
 
 def test_trials_without_a_goal_have_no_time_to_goal() -> None:
-    assert "goals: 0 of 1; median time to goal none" in "\n".join(trial.summarize(TRIAL_ROWS[1:2]))
+    assert "| 0 of 1 | 95 of 100 | 2 | none | fallen (seed 2) |" in "\n".join(strategy.summarize(TRIAL_ROWS[1:2]))
+
+
+def test_shots_are_counted_beside_those_that_a_figure_stops() -> None:
+    shots: list[Row] = [
+        {
+            "part": "shots",
+            "seed": seed,
+            "speed [m/s]": speed,
+            "kept out": kept,
+            "fell": False,
+            "touches": 1,
+            "kept out by a still figure": False,
+        }
+        for seed, speed, kept in ((1, 1.5, True), (2, 1.9, True), (3, 1.8, False))
+    ]
+    text = "\n".join(strategy.summarize(shots))
+    assert "kept out: 2 of 3 (bar: 60%); of those at 1.75 m/s or more 1 of 2; falls 0" in text
+    assert "0.3 m before the line: 0 of 3" in text
 
 
 def test_walks_are_summarized_one_line_a_walk() -> None:

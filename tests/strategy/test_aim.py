@@ -67,3 +67,11 @@ def test_the_middle_of_every_gap_passes_all_obstacles_and_posts(
             ):
                 across = abs(-math.sin(gap.middle) * dx + math.cos(gap.middle) * dy)
                 assert across >= radius + BALL_RADIUS - 1e-9
+
+
+def test_an_opponent_that_moves_while_the_ball_rolls_leaves_less_room() -> None:
+    still, moving = (free_gaps((2.0, 0.0), POSTS, 0.055, [(4.2, 0.0)], 0.3, 0.094, reach) for reach in (0.0, 0.09))
+    assert len(still) == len(moving) == 2
+    for one, other in zip(still, moving, strict=True):
+        assert other.width < one.width
+        assert abs(other.middle) > abs(one.middle)  # farther off the opponent

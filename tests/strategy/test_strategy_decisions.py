@@ -230,12 +230,13 @@ def test_no_kick_while_motion_control_still_walks() -> None:
 
 def test_a_robot_unsure_of_its_place_glances_at_landmarks_while_it_tracks_the_ball() -> None:
     outwards = Pose2D(2.25, 1.6, math.pi / 2.0)  # the ball ahead has no landmark beside it
+    others = (seen_object(outwards, (4.4, 0.0), (0.0, 0.0)),)  # nobody has to look for the keeper
     for spread, glances in ((0.01, False), (0.3, True)):
         strategy = Strategy(PARAMETERS, FIELD.without_poles())
         decisions = []
         for tick in range(100):
             robot = RobotEstimate(outwards, np.eye(3) * spread**2, outwards)
-            seen = WorldState(tick * 20_000_000, robot, seen_object(outwards, (2.05, 2.6), (0.0, 0.0)), ())
+            seen = WorldState(tick * 20_000_000, robot, seen_object(outwards, (2.05, 2.6), (0.0, 0.0)), others)
             decisions.append(strategy.decide(seen.stamp, seen, game_state(seen.stamp), PLAY, None))
         assert {decision.head.mode for decision in decisions} == {HeadMode.TRACK}
         assert any(decision.head.glance is not None for decision in decisions) is glances

@@ -21,6 +21,9 @@ FREE = math.radians(25.0)
 """To either side of an opponent, where a ball that is cleared would meet it."""
 CLEARING = [math.radians(angle) for angle in range(-60, 61, 15)]
 """Directions in which a ball may be cleared, from straight out of the goal."""
+NEAR = 0.5  # [m] a ball at the feet
+SAME = math.radians(8.0)  # two directions nearer than this are one
+BLOCKED, KEPT = 3.0, 0.3  # [rad] of way round the ball that a free direction, and the one chosen before, are worth
 
 
 def goalkeeper(context: Context) -> Behaviour:
@@ -30,7 +33,7 @@ def goalkeeper(context: Context) -> Behaviour:
     clear = Selector("go and kick it", memory=False)
     clear.add_children([kick_away, Approach(context)])
     near = Sequence("clear the ball", memory=False)
-    near.add_children([NearBall(context), Do("aim out of the goal", context, aim_outwards), clear])
+    near.add_children([NearBall(context), Do("aim out of the goal", context, Outwards().aim), clear])
     keeper = Selector("goalkeeper", memory=False)
     keeper.add_children([Block(context), near, Guard(context)])
     return keeper
@@ -171,22 +174,33 @@ def guarding_place(ball: Point | None, context: Context) -> Pose2D:
     return Pose2D(x, y, yaw)
 
 
-def aim_outwards(context: Context) -> None:
-    """Aim out of the goal, where no opponent stands, with as little of a way round the ball as that takes."""
-    world, ball = context.world, context.ball.position
-    if world is None or ball is None:
-        return
-    pose, goal = world.robot.pose, context.field.own_goal
-    x, y = pose.transform(ball)
-    straight = math.atan2(y, x - goal.x)  # from the middle of the goal through the ball
-    present = pose.yaw + math.atan2(ball[1], ball[0])
-    opponents = [pose.transform(tuple(each.position)) for each in context.opponents]
-    at = [math.atan2(oy - y, ox - x) for ox, oy in opponents]
+class Outwards:
+    """Aims out of the goal, where no opponent stands, with as little of a way round the ball as that takes."""
 
-    def cost(direction: float) -> float:
-        blocked = sum(max(0.0, 1.0 - abs(wrap_angle(direction - each)) / FREE) for each in at)
-        return abs(wrap_angle(direction - present)) + 3.0 * blocked
+    def __init__(self) -> None:
+        self._last: float | None = None  # direction chosen before, in map [rad]
 
-    best = min((straight + turn for turn in CLEARING), key=cost)
-    reach = context.parameters.keeper_clear_reach
-    context.aim.at_point(world, ball, (x + reach * math.cos(best), y + reach * math.sin(best)), context.dt)
+    def aim(self, context: Context) -> None:
+        """Aim at a point in the best direction; the one chosen before counts for a little more."""
+        world, ball = context.world, context.ball.position
+        if world is None or ball is None:
+            self._last = None
+            return
+        pose, goal = world.robot.pose, context.field.own_goal
+        x, y = pose.transform(ball)
+        straight = math.atan2(y, x - goal.x)  # from the middle of the goal through the ball
+        # A ball at the feet is kicked where the robot faces, one far away where the way to it leads.
+        far = max(0.0, min(1.0, (math.hypot(*ball) - NEAR) / NEAR))
+        present = pose.yaw + far * math.atan2(ball[1], ball[0])
+        opponents = [pose.transform((float(each.position[0]), float(each.position[1]))) for each in context.opponents]
+        at = [math.atan2(oy - y, ox - x) for ox, oy in opponents]
+
+        def cost(direction: float) -> float:
+            blocked = sum(max(0.0, 1.0 - abs(wrap_angle(direction - each)) / FREE) for each in at)
+            kept = self._last is not None and abs(wrap_angle(direction - self._last)) < SAME
+            return abs(wrap_angle(direction - present)) + BLOCKED * blocked - (KEPT if kept else 0.0)
+
+        self._last = min((wrap_angle(straight + turn) for turn in CLEARING), key=cost)
+        reach = context.parameters.keeper_clear_reach
+        point = (x + reach * math.cos(self._last), y + reach * math.sin(self._last))
+        context.aim.at_point(world, ball, point, context.dt)
