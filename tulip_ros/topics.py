@@ -24,6 +24,7 @@ from tf2_msgs.msg import TFMessage
 
 from tulip_msgs.action import Kick
 from tulip_msgs.msg import (
+    BehaviourTree,
     Decision,
     Features,
     FootForces,
@@ -187,6 +188,14 @@ USER_COMMAND = Topic("user_command", UserCommand, LATCHED, ("user_input",), ("st
 WALK_COMMAND = Topic("walk_command", WalkCommand, CONTROL, ("strategy",), ("motion",), "velocity or goal for the legs")
 HEAD_COMMAND = Topic("head_command", HeadCommand, CONTROL, ("strategy",), ("head",), "what the head shall look at")
 DECISION = Topic("decision", Decision, STATE, ("strategy",), (), "what strategy decided and why (behaviour tree)")
+BEHAVIOUR_TREE = Topic(
+    "behaviour_tree",
+    BehaviourTree,
+    LATCHED,
+    ("strategy",),
+    (),
+    "every node of the behaviour tree and what it says, whenever that changes",
+)
 ROBOT_DESCRIPTION = Topic("robot_description", String, LATCHED, ("driver",), (), "URDF of the robot, for viewers")
 DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, EVENTS, ALL_NODES, (), "health of each node, once a second")
 GROUND_TRUTH = Topic(
@@ -220,6 +229,7 @@ TOPICS: tuple[Topic, ...] = (
     WALK_COMMAND,
     HEAD_COMMAND,
     DECISION,
+    BEHAVIOUR_TREE,
     ROBOT_DESCRIPTION,
     DIAGNOSTICS,
     GROUND_TRUTH,

@@ -11,6 +11,7 @@ from tulip_description.planar import Pose2D
 from tulip_motion.interface import KickGoal
 from tulip_motion.messages import head_command_to_message, walk_command_to_message
 from tulip_msgs.action import Kick
+from tulip_msgs.msg import BehaviourTree as BehaviourTreeMessage
 from tulip_msgs.msg import Decision as DecisionMessage
 from tulip_msgs.msg import GameState as GameStateMessage
 from tulip_msgs.msg import ObjectEstimate as ObjectEstimateMessage
@@ -18,6 +19,7 @@ from tulip_msgs.msg import UserCommand as UserCommandMessage
 from tulip_msgs.msg import WorldState as WorldStateMessage
 from tulip_ros.time import from_message, header, stamp_of
 from tulip_strategy.interface import Decision, GamePhase, GameState, UserCommand, UserRequest
+from tulip_strategy.tree_state import NodeKind, NodeStatus, TreeState
 from tulip_worldmodel.world_state import ObjectEstimate, RobotEstimate, WorldState
 
 
@@ -54,6 +56,28 @@ def game_state_from_message(message: GameStateMessage) -> GameState:
         penalty=message.penalty,
         seconds_till_unpenalised=message.seconds_till_unpenalised,
         stale=message.stale,
+    )
+
+
+def tree_to_message(tree: TreeState) -> BehaviourTreeMessage:
+    """Return a behaviour tree as a message."""
+    return BehaviourTreeMessage(
+        header=header(tree.stamp, BASE_FOOTPRINT),
+        names=list(tree.names),
+        parents=list(tree.parents),
+        kinds=[kind.value for kind in tree.kinds],
+        statuses=[status.value for status in tree.statuses],
+    )
+
+
+def tree_from_message(message: BehaviourTreeMessage) -> TreeState:
+    """Return the behaviour tree of a message."""
+    return TreeState(
+        stamp=stamp_of(message),
+        names=tuple(message.names),
+        parents=tuple(message.parents),
+        kinds=tuple(NodeKind(kind) for kind in message.kinds),
+        statuses=tuple(NodeStatus(status) for status in message.statuses),
     )
 
 

@@ -13,6 +13,7 @@ from tulip_strategy.behaviour.steering import STILL, Acceleration
 from tulip_strategy.behaviour.tree import build_tree
 from tulip_strategy.interface import Decision, GamePhase, GameState, UserCommand
 from tulip_strategy.parameters import StrategyParameters
+from tulip_strategy.tree_state import TreeWatch
 from tulip_worldmodel.world_state import WorldState
 
 LONGEST_GAP = 0.2  # [s] after a longer pause between decisions, velocities still change as slowly as after this
@@ -24,6 +25,9 @@ class Strategy:
     def __init__(self, parameters: StrategyParameters, field: Field) -> None:
         self._context = Context(parameters, field)
         self._tree = build_tree(self._context)
+        self._watch = TreeWatch(self._tree)
+        self.tree = self._watch.state(0)
+        """The whole tree as it decided last."""
         self._acceleration = Acceleration(parameters)
         self._last_stamp: int | None = None
 
@@ -54,7 +58,7 @@ class Strategy:
             context.kicks = 0
         context.clear_wish()
         context.see(world)
-        self._tree.tick_once()
+        self.tree = self._watch.state(stamp, [node.id for node in self._tree.tick()])
         return Decision(stamp, self._walk(), self._head(), context.kick, active_path(self._tree))
 
     def _walk(self) -> WalkCommand:

@@ -22,11 +22,13 @@ from tulip_strategy.messages import (
     decision_to_message,
     game_state_from_message,
     kick_goal_to_message,
+    tree_to_message,
     user_command_from_message,
     world_state_from_message,
 )
 from tulip_strategy.parameters import StrategyParameters
 from tulip_strategy.strategy import Strategy
+from tulip_strategy.tree_state import NodeStatus
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,7 @@ class StrategyNode(ComponentNode):
         self._walk = self.sender(topics.WALK_COMMAND)
         self._head = self.sender(topics.HEAD_COMMAND)
         self._decision = self.sender(topics.DECISION)
+        self._tree = self.sender(topics.BEHAVIOUR_TREE)
         self._kicks = ActionClient(self, topics.KICK.type, topics.KICK.name)
         self.listen(topics.WORLD_STATE, self._on_world_state)
         self.listen(topics.GAME_STATE, self._on_game_state)
@@ -63,6 +66,7 @@ class StrategyNode(ComponentNode):
         self._strategy = Strategy(self._settings, self._field)
         self._game: GameState | None = None
         self._motion: MotionStateMessage | None = None
+        self._told: tuple[NodeStatus, ...] = ()
 
     def _on_game_state(self, message: GameStateMessage) -> None:
         self._game = game_state_from_message(message)
@@ -80,6 +84,10 @@ class StrategyNode(ComponentNode):
         self._walk.publish(walk_command_to_message(decision.walk))
         self._head.publish(head_command_to_message(decision.head))
         self._decision.publish(decision_to_message(decision))
+        tree = self._strategy.tree
+        if tree.statuses != self._told:
+            self._tree.publish(tree_to_message(tree))
+            self._told = tree.statuses
         if decision.kick is not None:
             self._kick(decision.kick)
 
