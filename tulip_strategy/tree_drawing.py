@@ -38,19 +38,20 @@ def terminal_tree(state: TreeState, whole: bool = False) -> Tree:
     return root
 
 
-def mermaid(state: TreeState, root: int = 0) -> str:
+def mermaid(state: TreeState, root: int = 0, depth: int | None = None) -> str:
     """Return a branch of the tree as a Mermaid flow chart.
 
     Args:
         state: The tree.
         root: Index of the branch's first node.
+        depth: How many levels below that are drawn; None for all.
     """
     lines = ["```mermaid", "flowchart LR"]
-    inside = {root}
+    levels = {root: 0}
     for index, (name, parent, kind) in enumerate(zip(state.names, state.parents, state.kinds, strict=True)):
-        if index != root and parent not in inside:
+        if index != root and (parent not in levels or levels[parent] == depth):
             continue
-        inside.add(index)
+        levels[index] = levels[parent] + 1 if index != root else 0
         text = f"{SIGNS[kind]} {name}".strip()
         left, right = ("([", "])") if kind is NodeKind.LEAF else ("[", "]")
         lines.append(f'    n{index}{left}"{text}"{right}')
