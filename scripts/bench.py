@@ -30,6 +30,7 @@ from tulip_sim.bench import (
     localization,
     odometry,
     push,
+    referee,
     stress,
     trial,
     vision,
@@ -37,7 +38,23 @@ from tulip_sim.bench import (
 )
 from tulip_sim.bench.runner import Row, run, save, write_results
 
-MODULES = (trial, walk, push, kick, odometry, control, ilc, clik, stress, vision, localization, ball, head, latency)
+MODULES = (
+    trial,
+    walk,
+    push,
+    kick,
+    odometry,
+    control,
+    ilc,
+    clik,
+    stress,
+    vision,
+    localization,
+    ball,
+    head,
+    latency,
+    referee,
+)
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"
 

@@ -103,9 +103,10 @@ class Game:
 
 
 @contextmanager
-def game_of(version: int) -> Iterator[Game]:
+def game_of(version: int, *parameters: str) -> Iterator[Game]:
     port, reply_port = free_port(), free_port() if version >= 12 else 0
     settings = [f"game_input:port:={port}", f"game_input:reply_port:={reply_port}"]
+    settings += [f"game_input:{each}" for each in parameters]
     arguments = ["test", "--ros-args"] + [word for each in settings for word in ("-p", each)]
     with (
         RefereeSocket(port=port, reply_port=reply_port) as referee,
@@ -169,6 +170,26 @@ def test_replies_come_once_a_second_and_tell_where_the_robot_is_and_that_it_fell
         count = len(game.replies)
         game.until(lambda: len(game.replies) >= count + 2, playing)
         assert game.replies[-1][1].status.fallen
+
+
+@pytest.mark.parametrize("version", [19, 20])
+def test_a_stopped_game_stops_the_robot_until_it_goes_on(version: int) -> None:
+    with game_of(version) as game:
+        playing = packet(version, GamePhase.PLAYING)
+        game.until(lambda: game.decisions and game.decisions[-1].walk.mode == WalkMode.WALK, playing)
+        stopped = playing[:8] + b"\1" + playing[9:]
+        assert game.decides("halted", stopped).walk.mode == WalkMode.STAND
+        game.decides("playing", playing)
+
+
+def test_the_robot_plays_on_while_no_packets_come_and_the_state_is_stale() -> None:
+    with game_of(20, "stale_after:=0.3") as game:
+        game.decides("playing", packet(20, GamePhase.PLAYING))
+        game.until(lambda: game.games[-1].stale)
+        assert game.games[-1].phase == GamePhase.PLAYING
+        game.decides("playing", b"")
+        game.decides("set", packet(20, GamePhase.SET))
+        assert not game.games[-1].stale
 
 
 def test_packets_of_another_game_in_every_version_do_not_stop_the_robot() -> None:
