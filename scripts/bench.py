@@ -21,6 +21,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
 from tulip_sim.bench import (
     ball,
+    batch,
     clik,
     control,
     head,
@@ -54,6 +55,7 @@ MODULES = (
     head,
     latency,
     referee,
+    batch,
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"
