@@ -107,13 +107,11 @@ def test_a_batch_that_is_killed_goes_on_without_loss_or_repetition(tmp_path: Pat
     rows = table(results)
     assert len(rows) == len(JOBS)
     assert {(each["set"], int(each["seed"])) for each in rows} == JOBS
-    assert all(each["outcome"] == "time" and each["time"] == "0.6" for each in rows)
+    assert all(each["outcome"] == "time" and float(each["time"]) == pytest.approx(0.6, abs=0.005) for each in rows)
 
-    stamp = journal.stat().st_mtime_ns
     idle = subprocess.run(words, env=environment(), capture_output=True, text=True, timeout=PATIENCE)
     assert idle.returncode == 0, idle.stderr
     assert journal.read_bytes().count(b"\n") == len(JOBS) + 1
-    assert journal.stat().st_mtime_ns >= stamp
     assert table(results) == rows
 
 
@@ -310,7 +308,7 @@ def test_bad_input_ends_with_exit_code_2_and_one_line(tmp_path: Path, arguments:
 def test_numbers_out_of_range_are_refused(tmp_path: Path, arguments: list[str]) -> None:
     result = invoke(tmp_path / "results.csv", *arguments)
     assert result.exit_code == 2
-    assert "is not in the range" in result.output
+    assert "greater than or equal to" in " ".join(result.output.replace("│", " ").split())
 
 
 def test_a_cluster_that_does_not_exist_is_named(tmp_path: Path) -> None:
