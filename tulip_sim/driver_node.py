@@ -26,19 +26,17 @@ from tulip_msgs.msg import FootForces
 from tulip_msgs.msg import JointCommand as JointCommandMessage
 from tulip_msgs.srv import PlaceBall, Push, Reset
 from tulip_ros import topics
-from tulip_ros.errors import BadInputError
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.time import stamp_of, to_message
 from tulip_sim.camera import CameraParameters, CameraRenderer
 from tulip_sim.messages import jpeg_to_message, lens_to_message, truth_to_message
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.referee import Referee, RefereeParameters
-from tulip_sim.referee_udp import RefereeSocket
+from tulip_sim.referee_link import hear_replies, open_referee
 from tulip_sim.scenario import SCENARIOS, make_scenario
 from tulip_sim.timing import CAMERA_TICKS, SLOW_TICKS, TICK
 from tulip_sim.world import World
-from tulip_strategy.game_controller import REFEREE_PORT, Rejected
-from tulip_strategy.game_controller.replies import ANSWERS
+from tulip_strategy.game_controller import REFEREE_PORT
 from tulip_vision.lens import head_camera_lens
 from tulip_vision.messages import picture_to_message
 
@@ -98,7 +96,9 @@ class DriverNode(ComponentNode):
         self._cells = np.array([foot.cells for foot in self._robot.feet])
         self._camera = CameraRenderer(p.pictures, self._field, self._robot, self._lens)
         self._referee = Referee(p.rules, self._field)
-        self._referee_socket = self._open_referee() if p.referee else None
+        self._referee_socket = (
+            open_referee(p.referee_address, p.referee_port, p.rules.version, p.reply_port) if p.referee else None
+        )
         self._joints = self.sender(topics.JOINT_STATES)
         self._imu = self.sender(topics.IMU)
         self._forces = self.sender(topics.FOOT_FORCES)
@@ -119,25 +119,6 @@ class DriverNode(ComponentNode):
             self.create_service(service.type, service.name, answer)
         self._wish: tuple[str, int] | None = None  # scenario and seed to begin anew with
         self._begin(p.scenario, p.seed)
-
-    def _open_referee(self) -> RefereeSocket:
-        p = self._settings
-        port = p.reply_port or ANSWERS[p.rules.version][1]
-        try:
-            # Robots on this machine hold their own port: they answer where the packets come from.
-            return RefereeSocket(p.referee_address, p.referee_port, 0 if port == REFEREE_PORT else port)
-        except OSError as error:
-            raise BadInputError(
-                f"The referee cannot hear robots on UDP port {port}: {error.strerror or error}. End the program that "
-                "uses it (`ss -ulpn` lists them), or set the parameter reply_port of nodes driver and game_input."
-            ) from error
-
-    def _hear_replies(self, referee: RefereeSocket) -> None:
-        for reply in referee.replies():
-            if isinstance(reply, Rejected):
-                self.health.count("rejected replies", f"a robot's reply is not understood: {reply.reason}")
-            else:
-                self.health.count("replies of robots")
 
     def _begin(self, scenario: str, seed: int) -> None:
         p = self._settings
@@ -193,7 +174,7 @@ class DriverNode(ComponentNode):
         packet = self._referee.update(truth)
         if packet is not None and self._referee_socket is not None:
             self._referee_socket.send(packet)
-            self._hear_replies(self._referee_socket)
+            hear_replies(self._referee_socket, self.health)
         if self._tick % SLOW_TICKS == 0:
             self._clock_sender.publish(Clock(clock=to_message(truth.stamp)))
             self._truth.publish(truth_to_message(truth, self._referee))
