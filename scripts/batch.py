@@ -26,7 +26,6 @@ from tulip_sim.batch.journal import Journal
 from tulip_sim.batch.parameter_sets import DEFAULT, read_sets
 from tulip_sim.batch.results import check_ending, summarize, write_results
 from tulip_sim.batch.workers import play_here, play_on_ray
-from tulip_sim.lockstep import Settings
 from tulip_sim.perception import PerceptionParameters
 from tulip_sim.scenario import SCENARIOS
 
@@ -60,8 +59,8 @@ def main(
             raise BadInputError("--workers is for this machine; expected it without --ray.")
         check_ending(results)
         check_writable(results, "Results file")
-        base = Settings(perception=EYES[eyes])
-        chosen = {DEFAULT: base} if sets is None else read_sets(sets, base)
+        base = PLAYS[play].base(EYES[eyes])
+        chosen = {DEFAULT: base} if sets is None else read_sets(sets, base, PLAYS[play].change)
         batch = Batch(play, scenario, chosen, range(first_seed, first_seed + number))
         with Journal(results.with_name(results.name + JOURNAL), batch) as journal:
             try:

@@ -136,7 +136,7 @@ def test_the_same_batch_on_a_ray_cluster(tmp_path: Path) -> None:
     rows = pyarrow.read_table(results).to_pylist()
     assert {(each["set"], each["seed"]) for each in rows} == JOBS
     assert len(rows) == len(JOBS)
-    here = PLAYS["trial"].run(3, "trial", read_sets(tmp_path / "sets.yaml", IDEAL)["slow"])
+    here = PLAYS["trial"].run(3, "trial", read_sets(tmp_path / "sets.yaml", IDEAL, make_settings)["slow"])
     there = next(each for each in rows if (each["set"], each["seed"]) == ("slow", 3))
     assert {name: there[name] for name in here if name != "real_time_factor"} == {
         name: value for name, value in here.items() if name != "real_time_factor"
@@ -155,16 +155,18 @@ def test_parameter_sets_address_parameters_as_the_graph_does(tmp_path: Path) -> 
                 "other": {
                     "driver": {"rules.playing_time": 20, "world": {"ball_mass": 0.4, "sensors": {"period": 8}}},
                     "/striker/strategy": {"ros__parameters": {"forward_speed": 0.3}},
-                    "perception": {"quality": {"rate": 10.0}} if "rate" in vars(IDEAL.perception) else {},
+                    "perception": {"quality.latency": 0.5},
                 },
             }
         )
     )
-    sets = read_sets(path, IDEAL)
+    sets = read_sets(path, IDEAL, make_settings)
     assert sets["plain"] == IDEAL
     other = sets["other"]
     assert (other.referee.playing_time, other.world.ball_mass, other.world.sensors.period) == (20.0, 0.4, 8)
     assert other.strategy.forward_speed == 0.3
+    assert other.perception is not None
+    assert other.perception.latency == 0.5
     assert other.motion == IDEAL.motion
 
 
@@ -188,7 +190,7 @@ def test_bad_parameter_sets_are_named(tmp_path: Path, text: str, words: str) -> 
     path = tmp_path / "sets.yaml"
     path.write_text(text)
     with pytest.raises(BadInputError, match=words):
-        read_sets(path, Settings())
+        read_sets(path, Settings(), make_settings)
 
 
 def test_jobs_are_all_sets_with_all_seeds_in_turn() -> None:

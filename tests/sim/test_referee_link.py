@@ -17,7 +17,9 @@ def test_a_reply_port_in_use_is_an_error_that_names_port_and_remedy() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         port = other.getsockname()[1]
-        with pytest.raises(BadInputError, match=rf"UDP port {port}: Address already in use.*set the parameter reply_po"):
+        with pytest.raises(
+            BadInputError, match=rf"UDP port {port}: Address already in use.*set the parameter reply_po"
+        ):
             open_referee("127.0.0.1", 3838, 20, port)
         open_referee("127.0.0.1", port, 7).close()  # in version 7 it needs no port of its own
 

@@ -7,8 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from tulip_sim.batch.parameter_sets import make_settings
 from tulip_sim.lockstep import Settings
 from tulip_sim.match_lockstep import play_lockstep
+from tulip_sim.perception import PerceptionParameters
 
 Row = dict[str, Any]
 """Figures of one job by name; text, numbers, truth values or None."""
@@ -19,14 +21,18 @@ class Play:
     """A kind of game that a batch can play.
 
     Attributes:
-        run: Plays once, given seed, scenario and parameters of all cores; returns its figures. A function of a module,
-            so that other processes can call it.
+        run: Plays once, given seed, scenario and settings; returns its figures. A function of a module, so that other
+            processes can call it.
+        base: Makes the settings that parameter sets change, of a perception without pictures, or of None for cameras.
+        change: Returns settings with some parameters changed, given by node and name; BadInputError if they do not fit.
         rates: Columns of truth values, by the words that the summary has for them.
         means: Columns of numbers, by those words; each with a column of truth values that a row must have set to count,
             or "" for all rows.
     """
 
-    run: Callable[[int, str, Settings], Row]
+    run: Callable[[int, str, Any], Row]
+    base: Callable[[PerceptionParameters | None], Any]
+    change: Callable[[Mapping[str, Mapping[str, Any]], Any], Any]
     rates: Mapping[str, str] = field(default_factory=dict)
     means: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
@@ -51,13 +57,13 @@ class Batch:
     Attributes:
         play: One of `PLAYS`.
         scenario: Name of the scenario.
-        sets: Parameters of all cores, by the name of the set.
+        sets: Settings of the play, by the name of the parameter set.
         seeds: That each set plays with.
     """
 
     play: str
     scenario: str
-    sets: Mapping[str, Settings]
+    sets: Mapping[str, Any]
     seeds: Sequence[int]
 
     def jobs(self) -> list[Job]:
@@ -96,6 +102,8 @@ def play_trial(seed: int, scenario: str, settings: Settings) -> Row:
 PLAYS: dict[str, Play] = {
     "trial": Play(
         play_trial,
+        base=lambda perception: Settings(perception=perception),
+        change=make_settings,
         rates={"goals": "scored", "trials with a fall": "fell"},
         means={
             "time to goal [s]": ("time", "scored"),
@@ -109,6 +117,6 @@ PLAYS: dict[str, Play] = {
 """What a batch can play, by name."""
 
 
-def run_job(play: str, scenario: str, settings: Settings, job: Job) -> Row:
+def run_job(play: str, scenario: str, settings: Any, job: Job) -> Row:
     """Play one job and return its row; called in the processes that work."""
     return {"set": job.parameters, "seed": job.seed, **PLAYS[play].run(job.seed, scenario, settings)}

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from tulip_ros import parameters
 from tulip_ros.errors import BadInputError, unknown
-from tulip_ros.plan import as_parameters, read_yaml
+from tulip_ros.plan import Values, as_parameters, read_yaml
 from tulip_sim.camera import CameraParameters
 from tulip_sim.lockstep import Settings
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.perception import PerceptionParameters
 from tulip_sim.referee import RefereeParameters
+
+S = TypeVar("S")
 
 DEFAULT = "default"
 """The set that a batch plays without a file."""
@@ -38,12 +40,13 @@ class _Perception:
     quality: PerceptionParameters
 
 
-def read_sets(path: Path, base: Settings) -> dict[str, Settings]:
+def read_sets(path: Path, base: S, change: Callable[[Mapping[str, Values], S], S]) -> dict[str, S]:
     """Read a file of named parameter sets.
 
     Args:
         path: YAML or JSON.
-        base: What the sets change.
+        base: Settings that the sets change.
+        change: Returns settings with some parameters changed, given by node and name, as `make_settings` does.
 
     Raises:
         BadInputError: if the file cannot be read or holds no set, or for an unknown node, name or value.
@@ -52,12 +55,12 @@ def read_sets(path: Path, base: Settings) -> dict[str, Settings]:
     if not isinstance(content, dict) or not content:
         raise BadInputError(f"File of parameter sets {path} holds no set; expected `set: {{node: {{name: value}}}}`.")
     return {
-        str(name): make_settings(as_parameters(blocks or {}, f"{path}, set {name}"), base)
+        str(name): change(as_parameters({} if blocks is None else blocks, f"{path}, set {name}"), base)
         for name, blocks in content.items()
     }
 
 
-def make_settings(values: Mapping[str, Mapping[str, Any]], base: Settings) -> Settings:
+def make_settings(values: Mapping[str, Values], base: Settings) -> Settings:
     """Return settings with some parameters changed.
 
     Args:
