@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import copy
 import json
 import random
 from pathlib import Path
@@ -217,6 +218,13 @@ def test_encode_refuses_values_that_do_not_fit() -> None:
 def test_a_name_that_a_version_does_not_have_is_an_error_that_lists_the_names() -> None:
     with pytest.raises(AttributeError, match="there is no 'stopped' here; expected one of: magic, version, packet_n"):
         _ = packet_of(write(18, 3)).stopped
+
+
+def test_packets_are_values_that_compare_and_can_be_copied() -> None:
+    packet = packet_of(write(12, 3))
+    assert copy.copy(packet) == packet
+    assert packet != packet_of(write(12, 2))
+    assert len({packet, packet_of(write(12, 3)), packet_of(write(20, 3))}) == 2
 
 
 @pytest.mark.parametrize("version", SIZES)

@@ -14,7 +14,7 @@ from tulip_sim.bench.runner import Bench, Row
 from tulip_sim.lockstep import Settings
 from tulip_sim.referee import RefereeParameters
 
-GAMES = 12
+GAMES = 16
 PLAYING = 10.0  # [s] too short for a goal, so that all games are equally long
 REPEATS = 2
 BAR = 1.9

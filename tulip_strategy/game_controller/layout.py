@@ -42,7 +42,7 @@ class Layout:
     tail: Table = ()
 
     @cached_property
-    def bytes(self) -> struct.Struct:
+    def codec(self) -> struct.Struct:
         """The whole packet."""
         team, player = _letters(self.team), _letters(self.player)
         teams = "".join(team + player * count for count in self.players)
@@ -51,7 +51,7 @@ class Layout:
     @property
     def size(self) -> int:
         """Length of a packet in bytes."""
-        return self.bytes.size
+        return self.codec.size
 
     @cached_property
     def team_starts(self) -> tuple[int, int]:
@@ -89,6 +89,8 @@ class Record:
         self._places, self._values, self._start = places, values, start
 
     def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):  # asked by copy before there are places to look into
+            raise AttributeError(name)
         try:
             index, count = self._places[name]
         except KeyError:
@@ -175,7 +177,7 @@ def make_packet(
     Raises:
         ValueError: if the layout has no such field or has room for fewer players, or if bytes are too long.
     """
-    values: list[Any] = list(layout.bytes.unpack(bytes(layout.size)))
+    values: list[Any] = list(layout.codec.unpack(bytes(layout.size)))
     letters = {**dict(layout.head), **dict(layout.tail)}
     _fill(values, layout.places, letters, 0, {**fields, "magic": magic, "version": layout.version}, layout.version)
     for index, team in enumerate(teams):

@@ -50,7 +50,7 @@ def decode(data: bytes) -> Packet | Rejected:
         return Rejected(
             Fault.SIZE, f"packet of version {layout.version} is {len(data)} bytes long; expected {layout.size}"
         )
-    packet = Packet(layout, layout.bytes.unpack(data))
+    packet = Packet(layout, layout.codec.unpack(data))
     if packet.version != layout.version:  # a field of two or four bytes
         return _unknown_version(packet.version)
     phases = MEANINGS[layout.version].phases
@@ -66,7 +66,7 @@ def encode(packet: Packet) -> bytes:
         ValueError: if a value does not fit its field.
     """
     try:
-        return packet.layout.bytes.pack(*packet.values)
+        return packet.layout.codec.pack(*packet.values)
     except struct.error as error:
         raise ValueError(f"packet does not fit version {packet.layout.version}: {error}") from error
 
