@@ -21,6 +21,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
 from tulip_sim.bench import (
     ball,
+    batch,
     clik,
     control,
     head,
@@ -30,6 +31,7 @@ from tulip_sim.bench import (
     localization,
     odometry,
     push,
+    referee,
     strategy,
     stress,
     vision,
@@ -37,7 +39,24 @@ from tulip_sim.bench import (
 )
 from tulip_sim.bench.runner import Row, run, save, write_results
 
-MODULES = (strategy, walk, push, kick, odometry, control, ilc, clik, stress, vision, localization, ball, head, latency)
+MODULES = (
+    strategy,
+    walk,
+    push,
+    kick,
+    odometry,
+    control,
+    ilc,
+    clik,
+    stress,
+    vision,
+    localization,
+    ball,
+    head,
+    latency,
+    referee,
+    batch,
+)
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"
 

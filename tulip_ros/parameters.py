@@ -118,7 +118,7 @@ def _check(name: str, default: Any, value: Any) -> None:
     else:  # None by default: whatever the dataclass accepts
         return
     if not fits:
-        raise BadInputError(f"Parameter {name} is {value!r}; expected {expected}, as in {_plain(default)!r}.")
+        raise BadInputError(f"Parameter {name} is {value!r}; expected {expected}, as in {_to_ros(default)!r}.")
 
 
 def _sequence_fits(default: Any, value: Any) -> tuple[bool, str]:

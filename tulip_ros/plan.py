@@ -108,25 +108,45 @@ def read_parameters(path: Path) -> dict[str, Values]:
     Raises:
         BadInputError: if it cannot be read, is no such YAML, or names a node that does not exist.
     """
+    content = read_yaml(path)
+    return {} if content is None else as_parameters(content, str(path))
+
+
+def read_yaml(path: Path) -> Any:
+    """Read a file of parameters, in YAML or JSON.
+
+    Raises:
+        BadInputError: if it cannot be read or is no such file.
+    """
     try:
-        content = yaml.load(path.read_text(), _Loader)
+        return yaml.load(path.read_text(), _Loader)
     except OSError as error:
         raise BadInputError(f"Parameter file {path} cannot be read: {error.strerror}.") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise BadInputError(f"Parameter file {path} is no valid YAML: {_what_is_wrong(error)}.") from error
-    if content is None:
-        return {}
+
+
+def as_parameters(content: Any, where: str) -> dict[str, Values]:
+    """Return parameters by node.
+
+    Args:
+        content: As in a parameter file.
+        where: That file, for messages.
+
+    Raises:
+        BadInputError: if it does not name nodes and values.
+    """
     if not isinstance(content, dict):
-        raise BadInputError(f"Parameter file {path} holds {type(content).__name__}; expected `node: {{name: value}}`.")
+        raise BadInputError(f"Parameter file {where} holds {type(content).__name__}; expected `node: {{name: value}}`.")
     result: dict[str, Values] = {}
     for key, block in content.items():
         name = str(key) if key == EVERY_NODE else str(key).split("/")[-1]
         if name not in (EVERY_NODE, "driver", *NODES):
-            raise unknown(f"node in {path} called", str(key), [*NODES, "driver", EVERY_NODE])
+            raise unknown(f"node in {where} called", str(key), [*NODES, "driver", EVERY_NODE])
         if isinstance(block, dict) and set(block) == {"ros__parameters"}:
             block = block["ros__parameters"]
         if not isinstance(block, dict):
-            raise BadInputError(f"Parameter file {path}: {key} holds {block!r}; expected `name: value` lines.")
+            raise BadInputError(f"Parameter file {where}: {key} holds {block!r}; expected `name: value` lines.")
         result[name] = block
     return result
 

@@ -177,8 +177,12 @@ ODOMETRY = Topic(
     ("worldmodel", "vision", "perception"),
     "dead reckoning: base_link in odom",
 )
-MOTION_STATE = Topic("motion_state", MotionState, CONTROL, ("motion",), ("strategy",), "everything about the legs")
-WORLD_STATE = Topic("world_state", WorldState, STATE, ("worldmodel",), ("strategy",), "robot, ball and opponents")
+MOTION_STATE = Topic(
+    "motion_state", MotionState, CONTROL, ("motion",), ("strategy", "game_input"), "everything about the legs"
+)
+WORLD_STATE = Topic(
+    "world_state", WorldState, STATE, ("worldmodel",), ("strategy", "game_input"), "robot, ball and opponents"
+)
 ROBOT_POSE = Topic(
     "robot_pose", PoseWithCovarianceStamped, STATE, ("worldmodel",), (), "base_footprint in map, for standard viewers"
 )

@@ -32,7 +32,7 @@ from tulip_sim.camera import CameraParameters, CameraRenderer
 from tulip_sim.messages import jpeg_to_message, lens_to_message, truth_to_message
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.referee import Referee, RefereeParameters
-from tulip_sim.referee_udp import RefereeSocket
+from tulip_sim.referee_link import hear_replies, open_referee
 from tulip_sim.scenario import SCENARIOS, make_scenario
 from tulip_sim.timing import CAMERA_TICKS, SLOW_TICKS, TICK
 from tulip_sim.world import World
@@ -58,6 +58,7 @@ class DriverNodeParameters:
     referee: bool = True
     referee_address: str = "127.0.0.1"
     referee_port: int = REFEREE_PORT
+    reply_port: int = 0  # where the referee hears robots; 0 for the port that its packets' version has
     answer_bound: float = 0.3  # [s] of wall-clock time to wait for an answer in sync mode
     start_bound: float = 30.0  # [s] of wall-clock time to wait for the other nodes at the start
     wait_for: tuple[str, ...] = ("motion",)  # nodes that must be in the graph before time begins
@@ -75,6 +76,8 @@ class DriverNodeParameters:
             raise ValueError(f"mode is {self.mode!r}; expected one of {', '.join(MODES)}")
         if self.scenario not in SCENARIOS:
             raise ValueError(f"scenario is {self.scenario!r}; expected one of {', '.join(SCENARIOS)}")
+        if not 0 <= self.reply_port < 65536:
+            raise ValueError(f"reply_port is {self.reply_port}; expected 0 to 65535")
         for name in ("speed", "answer_bound", "start_bound"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(f"{name} is {getattr(self, name)}; expected a finite number >= 0")
@@ -93,7 +96,9 @@ class DriverNode(ComponentNode):
         self._cells = np.array([foot.cells for foot in self._robot.feet])
         self._camera = CameraRenderer(p.pictures, self._field, self._robot, self._lens)
         self._referee = Referee(p.rules, self._field)
-        self._referee_socket = RefereeSocket(p.referee_address, p.referee_port) if p.referee else None
+        self._referee_socket = (
+            open_referee(p.referee_address, p.referee_port, p.rules.version, p.reply_port) if p.referee else None
+        )
         self._joints = self.sender(topics.JOINT_STATES)
         self._imu = self.sender(topics.IMU)
         self._forces = self.sender(topics.FOOT_FORCES)
@@ -169,7 +174,7 @@ class DriverNode(ComponentNode):
         packet = self._referee.update(truth)
         if packet is not None and self._referee_socket is not None:
             self._referee_socket.send(packet)
-            self._referee_socket.replies()  # emptied, so that they do not fill the system's buffer
+            hear_replies(self._referee_socket, self.health)
         if self._tick % SLOW_TICKS == 0:
             self._clock_sender.publish(Clock(clock=to_message(truth.stamp)))
             self._truth.publish(truth_to_message(truth, self._referee))

@@ -10,7 +10,7 @@ from tulip_description.field import Field, Goal
 from tulip_sim.referee_packets import PLAYERS, write_packet
 from tulip_sim.situation import PlayerSituation, Removal, Situation, TeamSituation
 from tulip_sim.truth import Truth
-from tulip_strategy.game_controller import TeamColour
+from tulip_strategy.game_controller import TeamColour, layout_of
 from tulip_strategy.interface import GamePhase
 
 SECOND = 10**9  # [ns]
@@ -32,6 +32,7 @@ class RefereeParameters:
     player_number: int = 1
     team_colour: TeamColour = TeamColour.CYAN
     opponent_number: int = 12
+    version: int = 7  # of the packets: 7, 8, 12, 18, 19 or 20
 
     def __post_init__(self) -> None:
         """Check the numbers.
@@ -54,6 +55,7 @@ class RefereeParameters:
             raise ValueError(f"team_number and opponent_number are both {self.team_number}; expected two numbers")
         if not 1 <= self.player_number <= min(PLAYERS):
             raise ValueError(f"player_number is {self.player_number}; expected 1 to {min(PLAYERS)}")
+        layout_of(self.version)  # refuses one that is not known
         if self.team_colour not in (TeamColour.CYAN, TeamColour.MAGENTA):
             raise ValueError(f"team_colour is {self.team_colour}; expected CYAN or MAGENTA")
 
@@ -180,7 +182,7 @@ class Referee:
         self._told = self.phase
         while self._next_packet <= self._now:
             self._next_packet += round(self._parameters.packet_period * SECOND)
-        packet = write_packet(self.situation())
+        packet = write_packet(self.situation(), self._parameters.version)
         self._packets += 1
         return packet
 

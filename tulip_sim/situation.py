@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from tulip_strategy.game_controller import TeamColour
-from tulip_strategy.interface import GamePhase
+from tulip_strategy.interface import GamePhase, SecondaryState
 
 
 class Removal(Enum):
@@ -43,6 +43,7 @@ class TeamSituation:
         score: Goals.
         players: In order of their numbers, from 1 on.
         scored_trials: One entry a finished trial as striker: whether it scored.
+        goalkeeper: Player number of the goalkeeper, 0 for none.
     """
 
     number: int
@@ -50,6 +51,7 @@ class TeamSituation:
     score: int
     players: tuple[PlayerSituation, ...]
     scored_trials: tuple[bool, ...] = ()
+    goalkeeper: int = 0
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,8 @@ class Situation:
         phase_seconds: Of the ready or set phase, else 0 [s].
         teams: The two teams, in an order that never changes.
         packet_number: Of packets sent before this one.
+        secondary: What kind of game it is told as; a penalty shoot-out is the nearest to dribble and kick.
+        stopped: The game is interrupted: robots must not move. Versions 19 and 20 alone tell it.
     """
 
     phase: GamePhase
@@ -73,3 +77,5 @@ class Situation:
     phase_seconds: int
     teams: tuple[TeamSituation, TeamSituation]
     packet_number: int = 0
+    secondary: SecondaryState = SecondaryState.PENALTY_SHOOT
+    stopped: bool = False

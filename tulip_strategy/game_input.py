@@ -5,16 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from tulip_strategy.game_controller import (
+    Fault,
     Packet,
     Rejected,
     Reply,
     ReplyMessage,
-    Team,
+    RobotStatus,
     TeamColour,
     decode,
     encode_reply,
 )
-from tulip_strategy.interface import GamePhase, GameState
+from tulip_strategy.game_controller.layout import Team
+from tulip_strategy.game_controller.meaning import MEANINGS
+from tulip_strategy.game_controller.penalties import penalty_of
+from tulip_strategy.game_controller.replies import ANSWERS, STATUS_VERSION
+from tulip_strategy.interface import GameState
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,7 @@ class GameInputParameters:
 
     team_number: int = 25
     player_number: int = 1  # counted from 1, as on the robot's back
-    team_colour: TeamColour | None = None  # picks one of two teams with the same number; None: the number alone does
+    team_colour: TeamColour = TeamColour.ANY  # picks one of two teams with the same number; any: the number alone does
     stale_after: float = 5.0  # [s] ten packets at 2 Hz lost in a row: the referee program or the network is gone
 
     def __post_init__(self) -> None:
@@ -33,6 +38,19 @@ class GameInputParameters:
             raise ValueError(f"player_number is {self.player_number}; expected 1 to 10")
         if not self.stale_after > 0.0:
             raise ValueError(f"stale_after is {self.stale_after} s; expected > 0")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What to send back.
+
+    Attributes:
+        data: Bytes of the reply.
+        port: UDP port at the referee that takes replies of this version.
+    """
+
+    data: bytes
+    port: int
 
 
 class GameInput:
@@ -51,13 +69,12 @@ class GameInput:
         packet = decode(data)
         if isinstance(packet, Rejected):
             return packet
-        own = self._own_team(packet)
+        teams = packet.teams
+        own = self._own_team(teams)
         if own is None:
-            numbers = " and ".join(f"{team.number} (colour {team.colour})" for team in packet.teams)
-            return Rejected(f"packet is for teams {numbers}; expected {self._who()}")
-        if self._parameters.player_number > len(packet.teams[own].players):
-            return Rejected(f"packet has no player {self._parameters.player_number}")
-        self._state = self._seen_from(packet, own, stamp)
+            numbers = " and ".join(f"{team.number} (colour {team.colour})" for team in teams)
+            return Rejected(Fault.TEAM, f"packet is for teams {numbers}; expected {self._who()}")
+        self._state = self._seen_from(packet, teams[own], teams[1 - own], stamp)
         return None
 
     def state(self, stamp: int) -> GameState | None:
@@ -65,35 +82,61 @@ class GameInput:
         if self._state is None:
             return None
         stale = stamp - self._state.stamp > round(self._parameters.stale_after * 1e9)
-        return replace(self._state, stale=stale)
+        return replace(self._state, stale=stale) if stale else self._state
 
-    def reply(self, message: ReplyMessage = ReplyMessage.ALIVE) -> bytes:
-        """Return the bytes to send back to the referee program."""
-        return encode_reply(Reply(self._parameters.team_number, self._parameters.player_number, message))
+    @property
+    def needs_status(self) -> bool:
+        """Whether the reply has to tell the robot's status."""
+        return self._state is not None and ANSWERS[self._state.version][0] == STATUS_VERSION
 
-    def _own_team(self, packet: Packet) -> int | None:
-        for index, team in enumerate(packet.teams):
-            if team.number == self._parameters.team_number and self._parameters.team_colour in (None, team.colour):
+    def answer(self, status: RobotStatus | None = None, message: ReplyMessage = ReplyMessage.ALIVE) -> Answer | None:
+        """Return the reply that fits the last packet.
+
+        Args:
+            status: Of the robot, or None while it is not known.
+            message: What to ask or say.
+
+        Returns:
+            None before the first valid packet, and while the reply needs a status that is not known: a robot that
+            nobody knows to stand or lie must not be reported as either.
+        """
+        if self._state is None or (status is None and self.needs_status):
+            return None
+        version, port = ANSWERS[self._state.version]
+        reply = Reply(self._parameters.team_number, self._parameters.player_number, message, version, status)
+        return Answer(encode_reply(reply), port)
+
+    def _own_team(self, teams: tuple[Team, Team]) -> int | None:
+        for index, team in enumerate(teams):
+            if team.number == self._parameters.team_number and self._parameters.team_colour in (
+                TeamColour.ANY,
+                team.colour,
+            ):
                 return index
         return None
 
     def _who(self) -> str:
         colour = self._parameters.team_colour
-        return f"{self._parameters.team_number}" + ("" if colour is None else f" (colour {colour.value})")
+        return f"{self._parameters.team_number}" + ("" if colour is TeamColour.ANY else f" (colour {colour.value})")
 
-    def _seen_from(self, packet: Packet, own: int, stamp: int) -> GameState:
-        team: Team = packet.teams[own]
-        player = team.players[self._parameters.player_number - 1]
+    def _seen_from(self, packet: Packet, own: Team, other: Team, stamp: int) -> GameState:
+        version = packet.layout.version
+        meaning = MEANINGS[version]
+        course = meaning.course(packet, own)
+        player = own.player(self._parameters.player_number)
         return GameState(
             stamp=stamp,
-            version=packet.version,
-            phase=GamePhase(packet.state),
+            version=version,
+            phase=meaning.phases[packet.state],
             first_half=bool(packet.first_half),
-            kick_off=packet.kick_off == team.colour,
-            secondary_state=packet.secondary_state,
+            kick_off=course.kick_off,
+            secondary_state=course.secondary,
             seconds_remaining=packet.seconds_remaining,
-            own_score=team.score,
-            opponent_score=packet.teams[1 - own].score,
-            penalty=player.penalty,
+            own_score=own.score,
+            opponent_score=other.score,
+            penalty=penalty_of(version, player.penalty),
             seconds_till_unpenalised=player.seconds,
+            stopped=course.stopped,
+            set_play=course.set_play,
+            goalkeeper=meaning.goalkeeper(own),
         )

@@ -5,17 +5,23 @@ from __future__ import annotations
 import socket
 from dataclasses import dataclass
 
+from rclpy.serialization import deserialize_message
+
+from tulip_msgs.msg import MotionState, WorldState
 from tulip_ros import topics
 from tulip_ros.errors import BadInputError
 from tulip_ros.run import ComponentNode, run
-from tulip_strategy.game_controller import REFEREE_PORT, REPLY_MAGIC
+from tulip_ros.time import stamp_of
+from tulip_strategy.complaints import Complaints
+from tulip_strategy.game_controller import REFEREE_PORT, REPLY_MAGIC, RobotStatus
 from tulip_strategy.game_input import GameInput, GameInputParameters
-from tulip_strategy.messages import game_state_to_message
+from tulip_strategy.messages import game_state_to_message, robot_status_from_messages
 
 POLL = 0.02  # [s] of wall-clock time between two looks at the socket: short against 0.5 s between packets
 MOST_PACKETS = 50  # a look; a flood must not stop the node
-COMPLAIN_AGAIN = 4_000_000_000  # [ns] packets come twice a second; diagnostics show a warning for 5 s
 DATAGRAM = 2048  # [B] more than any version's packet, so that a wrong size shows
+REPLY_PERIOD = 1.0  # [s] of wall-clock time, which the referee program goes by
+STATUS_AGE = 2_000_000_000  # [ns] an older status is not told: nobody knows whether it still holds
 
 
 @dataclass(frozen=True)
@@ -24,7 +30,7 @@ class GameInputNodeParameters(GameInputParameters):
 
     address: str = "127.0.0.1"  # interface to listen on; "0.0.0.0" on a robot, whose referee is another machine
     port: int = REFEREE_PORT  # UDP
-    reply_port: int = REFEREE_PORT  # UDP, at the referee; 3838 in 2013
+    reply_port: int = 0  # UDP, at the referee; 0 for the one that the packet's version has
 
     def __post_init__(self) -> None:
         """Check the numbers.
@@ -33,9 +39,9 @@ class GameInputNodeParameters(GameInputParameters):
             ValueError: if one is out of its range.
         """
         super().__post_init__()
-        for name in ("port", "reply_port"):
-            if not 0 < getattr(self, name) < 65536:
-                raise ValueError(f"{name} is {getattr(self, name)}; expected 1 to 65535")
+        for name, least in (("port", 1), ("reply_port", 0)):
+            if not least <= getattr(self, name) < 65536:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected {least} to 65535")
 
 
 class GameInputNode(ComponentNode):
@@ -53,12 +59,19 @@ class GameInputNode(ComponentNode):
         self.follow_clock()
         self._socket = self._open()
         self._state = self.sender(topics.GAME_STATE)
+        # Not deserialized before a reply needs them: that is once a second, and the legs' state comes at 250 Hz.
+        topics.MOTION_STATE.subscribe_from(self, self._on_motion, raw=True, depth=1)
+        topics.WORLD_STATE.subscribe_from(self, self._on_world, raw=True, depth=1)
         self.every(POLL, self._poll)
+        self.every(REPLY_PERIOD, self._reply)
 
     def begin_anew(self) -> None:
         """Make the core, which waits for the first packet."""
         self._input = GameInput(self._settings)
-        self._complaints: dict[str, int] = {}  # reason: when it was given [ns]
+        self._complaints = Complaints()
+        self._referee: tuple[str, int] | None = None  # who sent the last packet that was taken
+        self._motion: bytes | None = None
+        self._world: bytes | None = None
         self._stale = False
 
     def destroy_node(self) -> None:
@@ -80,6 +93,14 @@ class GameInputNode(ComponentNode):
             ) from error
         return opened
 
+    def _on_motion(self, data: bytes) -> None:
+        self.health.received(topics.MOTION_STATE.name)
+        self._motion = data
+
+    def _on_world(self, data: bytes) -> None:
+        self.health.received(topics.WORLD_STATE.name)
+        self._world = data
+
     def _poll(self) -> None:
         if self._now() == 0:
             return  # time has not begun, or this node was restarted and has not heard of it: packets wait
@@ -99,26 +120,45 @@ class GameInputNode(ComponentNode):
         stamp = self._now()
         rejected = self._input.receive(data, stamp)
         if rejected is not None:
-            self._complain(rejected.reason, stamp)
+            is_new = self._complaints.is_new(rejected.reason, stamp)
+            self.health.count(f"rejected packets ({rejected.fault.value})", rejected.reason if is_new else "")
             return
         self.health.count("packets")
+        is_first, self._referee = self._referee is None, sender
         self._publish(stamp)
-        self._reply(sender)
+        if is_first:
+            self._reply()
 
-    def _complain(self, reason: str, stamp: int) -> None:
-        """Count a packet that was rejected; say why, but not with every packet again."""
-        self._complaints = {old: at for old, at in self._complaints.items() if 0 <= stamp - at < COMPLAIN_AGAIN}
-        self.health.count("rejected packets", "" if reason in self._complaints else reason)
-        self._complaints.setdefault(reason, stamp)
-
-    def _reply(self, sender: tuple[str, int]) -> None:
+    def _reply(self) -> None:
+        """Answer the referee, unless it is silent or the reply needs to tell what is not known."""
+        state = self._input.state(self._now())
+        if self._referee is None or state is None or state.stale:
+            return
+        answer = self._input.answer(self._status() if self._input.needs_status else None)
+        if answer is None:
+            self.health.count("replies put off")
+            return
+        host, sent_from = self._referee
         p = self._settings
+        # In versions 7 and 8 the referee listens on the same port as robots do.
+        port = p.reply_port or (p.port if answer.port == REFEREE_PORT else answer.port)
         # A referee on this machine cannot hold our own port: it is answered where its packet came from.
-        port = sender[1] if (sender[0], p.reply_port) == self._socket.getsockname() else p.reply_port
+        if port == p.port and _is_this_machine(host):
+            port = sent_from
         try:
-            self._socket.sendto(self._input.reply(), (sender[0], port))
+            self._socket.sendto(answer.data, (host, port))
+            self.health.count("replies")
         except OSError as error:
             self.health.count("lost replies", f"cannot reply to the referee: {error.strerror or error}")
+
+    def _status(self) -> RobotStatus | None:
+        """Return the robot's status, or None while motion control or the world model do not tell it."""
+        if self._motion is None or self._world is None:
+            return None
+        motion, world = deserialize_message(self._motion, MotionState), deserialize_message(self._world, WorldState)
+        if max(abs(self._now() - stamp_of(message)) for message in (motion, world)) > STATUS_AGE:
+            return None
+        return robot_status_from_messages(motion, world)
 
     def _watch_age(self) -> None:
         state = self._input.state(self._now())
@@ -136,6 +176,16 @@ class GameInputNode(ComponentNode):
     def _now(self) -> int:
         """Return the time [ns]: packets carry no stamp of their own."""
         return int(self.get_clock().now().nanoseconds)
+
+
+def _is_this_machine(host: str) -> bool:
+    """Tell whether an address is one of this machine: only such a one can be bound."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind((host, 0))
+        except OSError:
+            return False
+    return True
 
 
 def main() -> None:

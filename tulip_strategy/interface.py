@@ -18,22 +18,76 @@ class GamePhase(IntEnum):
     FINISHED = 4
 
 
+class SecondaryState(IntEnum):
+    """What kind of game is played."""
+
+    NORMAL = 0
+    PENALTY_SHOOT = 1
+    OVERTIME = 2
+    TIMEOUT = 3
+
+
+class SetPlay(IntEnum):
+    """How play begins again after an interruption."""
+
+    NONE = 0
+    GOAL_KICK = 1
+    CORNER_KICK = 2
+    THROW_IN = 3
+    DIRECT_FREE_KICK = 4
+    INDIRECT_FREE_KICK = 5
+    PENALTY_KICK = 6
+
+
+class Penalty(IntEnum):
+    """Why a robot is out of play; up to MANUAL numbered as in 2013."""
+
+    NONE = 0
+    BALL_MANIPULATION = 1
+    """Also holding the ball, and playing it with arms or hands."""
+    PHYSICAL_CONTACT = 2
+    """Pushing."""
+    ILLEGAL_ATTACK = 3
+    ILLEGAL_DEFENCE = 4
+    PICK_UP = 5
+    SERVICE = 6
+    PICK_UP_TO_SERVICE = 7
+    ILLEGAL_POSITION = 8
+    ILLEGAL_MOTION = 9
+    """It moved when robots have to stand still."""
+    INACTIVE = 10
+    """It fell and did not get up, or cannot play."""
+    LEFT_FIELD = 11
+    GAME_STUCK = 12
+    CAUTIONED = 13
+    SUBSTITUTE = 14
+    """It does not take part at present."""
+    MANUAL = 15
+    SENT_OFF = 16
+    STANCE = 17
+    UNKNOWN = 255
+    """A code that the protocol does not name: out of play all the same."""
+
+
 @dataclass(frozen=True)
 class GameState:
-    """The game as the referee tells it, seen from the own team.
+    """The game as the referee tells it, seen from the own team; the same whatever version of its protocol does.
 
     Attributes:
         stamp: When the packet came in [ns].
         version: Protocol version of the packet.
         phase: See `GamePhase`.
         first_half: Whether the first half is played.
-        kick_off: Whether the own team has the kick-off.
-        secondary_state: 0 normal, 1 penalty shoot, 2 overtime, 3 timeout.
+        kick_off: Whether the own team has the kick-off, or the kick of the set play.
+        secondary_state: See `SecondaryState`.
         seconds_remaining: Of the present half or trial [s].
         own_score, opponent_score: Goals.
-        penalty: The own robot's penalty code, 0 for none.
+        penalty: Why the own robot is out of play, NONE if it is not.
         seconds_till_unpenalised: [s].
         stale: No valid packet for more than 5 s; the rest is the last that was known.
+        stopped: The referee has stopped the game: robots must not move, whatever the phase.
+        set_play: See `SetPlay`.
+        goalkeeper: Player number of the own team's goalkeeper, 0 where the packet does not tell.
     """
 
     stamp: int
@@ -41,13 +95,21 @@ class GameState:
     phase: GamePhase
     first_half: bool
     kick_off: bool
-    secondary_state: int
+    secondary_state: SecondaryState
     seconds_remaining: int
     own_score: int
     opponent_score: int
-    penalty: int
+    penalty: Penalty
     seconds_till_unpenalised: int
     stale: bool = False
+    stopped: bool = False
+    set_play: SetPlay = SetPlay.NONE
+    goalkeeper: int = 0
+
+    @property
+    def halted(self) -> bool:
+        """Whether robots must not move although the phase would let them."""
+        return self.stopped or self.secondary_state is SecondaryState.TIMEOUT
 
 
 class UserRequest(IntEnum):

@@ -14,11 +14,22 @@ from tulip_msgs.action import Kick
 from tulip_msgs.msg import BehaviourTree as BehaviourTreeMessage
 from tulip_msgs.msg import Decision as DecisionMessage
 from tulip_msgs.msg import GameState as GameStateMessage
+from tulip_msgs.msg import MotionState as MotionStateMessage
 from tulip_msgs.msg import ObjectEstimate as ObjectEstimateMessage
 from tulip_msgs.msg import UserCommand as UserCommandMessage
 from tulip_msgs.msg import WorldState as WorldStateMessage
 from tulip_ros.time import from_message, header, stamp_of
-from tulip_strategy.interface import Decision, GamePhase, GameState, UserCommand, UserRequest
+from tulip_strategy.game_controller import RobotStatus
+from tulip_strategy.interface import (
+    Decision,
+    GamePhase,
+    GameState,
+    Penalty,
+    SecondaryState,
+    SetPlay,
+    UserCommand,
+    UserRequest,
+)
 from tulip_strategy.tree_state import NodeKind, NodeStatus, TreeState
 from tulip_worldmodel.world_state import ObjectEstimate, RobotEstimate, WorldState
 
@@ -31,13 +42,16 @@ def game_state_to_message(state: GameState) -> GameStateMessage:
         phase=state.phase.value,
         first_half=state.first_half,
         kick_off=state.kick_off,
-        secondary_state=state.secondary_state,
+        secondary_state=state.secondary_state.value,
         seconds_remaining=state.seconds_remaining,
         own_score=state.own_score,
         opponent_score=state.opponent_score,
-        penalty=state.penalty,
+        penalty=state.penalty.value,
         seconds_till_unpenalised=state.seconds_till_unpenalised,
         stale=state.stale,
+        stopped=state.stopped,
+        set_play=state.set_play.value,
+        goalkeeper=state.goalkeeper,
     )
 
 
@@ -49,13 +63,16 @@ def game_state_from_message(message: GameStateMessage) -> GameState:
         phase=GamePhase(message.phase),
         first_half=message.first_half,
         kick_off=message.kick_off,
-        secondary_state=message.secondary_state,
+        secondary_state=SecondaryState(message.secondary_state),
         seconds_remaining=message.seconds_remaining,
         own_score=message.own_score,
         opponent_score=message.opponent_score,
-        penalty=message.penalty,
+        penalty=Penalty(message.penalty),
         seconds_till_unpenalised=message.seconds_till_unpenalised,
         stale=message.stale,
+        stopped=message.stopped,
+        set_play=SetPlay(message.set_play),
+        goalkeeper=message.goalkeeper,
     )
 
 
@@ -144,6 +161,17 @@ def world_state_from_message(message: WorldStateMessage) -> WorldState:
     ball = _object(message.ball) if message.ball_known else None
     opponents = tuple(_object(opponent) for opponent in message.opponents)
     return WorldState(stamp_of(message), robot, ball, opponents, from_message(message.picture))
+
+
+def robot_status_from_messages(motion: MotionStateMessage, world: WorldStateMessage) -> RobotStatus:
+    """Return what the robot tells the referee of itself."""
+    ball = (float(world.ball.position[0]), float(world.ball.position[1])) if world.ball_known else None
+    return RobotStatus(
+        fallen=motion.mode == MotionStateMessage.FALLEN,
+        pose=Pose2D(*_three(world.robot_pose)),
+        ball=ball,
+        ball_age=world.ball.age if world.ball_known else 0.0,
+    )
 
 
 def _object(message: ObjectEstimateMessage) -> ObjectEstimate:

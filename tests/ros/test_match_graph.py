@@ -64,7 +64,7 @@ def test_wrong_packets_during_a_game_change_nothing_and_are_named(tmp_path: Path
         begin = len(watcher.games)
         wrong = {
             b"RGme": "is 4 bytes long",
-            b"RGme\x0c" + bytes(683): "version is 12",
+            b"RGme\x0b" + bytes(683): "version is 11",
             bytes(range(256)) * 8: "packet begins with",
         }
         for data, words in wrong.items():

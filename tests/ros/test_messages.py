@@ -18,7 +18,7 @@ from tulip_msgs import msg
 from tulip_msgs.action import Kick
 from tulip_ros import schemas
 from tulip_ros.time import from_message, header, stamp_of, to_message
-from tulip_strategy.interface import GamePhase, GameState, UserRequest
+from tulip_strategy.interface import GamePhase, GameState, Penalty, SecondaryState, SetPlay, UserRequest
 from tulip_vision.features import Feature, FeatureClass
 
 INTERFACES = Path(__file__).parents[2] / "tulip_msgs"
@@ -70,6 +70,9 @@ def test_messages_survive_serialization(name: str):
         (MotionMode, msg.MotionState, ""),
         (Support, msg.MotionState, "SUPPORT_"),
         (GamePhase, msg.GameState, ""),
+        (SecondaryState, msg.GameState, "SECONDARY_"),
+        (SetPlay, msg.GameState, "SET_PLAY_"),
+        (Penalty, msg.GameState, "PENALTY_"),
         (UserRequest, msg.UserCommand, ""),
         (FeatureClass, msg.Feature, ""),
         (Side, Kick.Goal, ""),

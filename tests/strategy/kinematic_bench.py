@@ -11,7 +11,15 @@ from tulip_description.field import Field, load_field
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.interface import KickGoal, MotionMode, MotionState, Side, Support, WalkCommand, WalkMode
 from tulip_motion.parameters import MotionParameters
-from tulip_strategy.interface import Decision, GamePhase, GameState, UserCommand, UserRequest
+from tulip_strategy.interface import (
+    Decision,
+    GamePhase,
+    GameState,
+    Penalty,
+    SecondaryState,
+    UserCommand,
+    UserRequest,
+)
 from tulip_strategy.parameters import StrategyParameters
 from tulip_strategy.strategy import Strategy
 from tulip_worldmodel.world_state import ObjectEstimate, RobotEstimate, WorldState
@@ -58,7 +66,7 @@ def motion_state(stamp: int, mode: MotionMode, reason: str = "") -> MotionState:
 
 def game_state(stamp: int, phase: GamePhase = GamePhase.PLAYING, penalty: int = 0) -> GameState:
     """Return the game of a penalty-shoot-like trial."""
-    return GameState(stamp, 7, phase, True, True, 1, 150, 0, 0, penalty, 0)
+    return GameState(stamp, 7, phase, True, True, SecondaryState.PENALTY_SHOOT, 150, 0, 0, Penalty(penalty), 0)
 
 
 def seen_object(

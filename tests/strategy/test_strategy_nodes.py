@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from kinematic_bench import game_state, motion_state, seen_object
+from packet_bytes import write
 from rclpy.action import ActionServer
 from rclpy.action.client import ActionClient
 from rclpy.node import Node
@@ -21,7 +22,7 @@ from tulip_ros import topics
 from tulip_ros.errors import BadInputError
 from tulip_ros.run import session
 from tulip_sim.referee_udp import RefereeSocket
-from tulip_strategy.game_controller import Packet, Player, Reply, Team, encode
+from tulip_strategy.game_controller import Reply
 from tulip_strategy.game_input_node import GameInputNode
 from tulip_strategy.interface import Decision, UserCommand, UserRequest
 from tulip_strategy.messages import (
@@ -66,11 +67,6 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def packet(state: int = 3) -> bytes:
-    teams = (Team(12, 0, 1, 0, (Player(),) * 11), Team(25, 1, 1, 2, (Player(),) * 10))
-    return encode(Packet(7, 1, state, 1, 1, 1, 0, -1, 140, teams))
-
-
 def test_game_state_and_user_command_survive_the_messages() -> None:
     state = game_state(5 * 10**9, penalty=3)
     assert game_state_from_message(game_state_to_message(state)) == state
@@ -85,26 +81,40 @@ def test_a_decision_without_a_kick_says_so() -> None:
     assert message.tree == "robot"
 
 
-def test_game_input_publishes_packets_answers_them_and_reports_wrong_ones() -> None:
+def test_game_input_publishes_packets_answers_them_and_names_wrong_ones_once(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
     port = free_port()
     with (
-        running(GameInputNode, f"port:={port}", f"reply_port:={port}") as (node, until),
+        running(GameInputNode, f"port:={port}", "stale_after:=600.0") as (node, until),
         RefereeSocket(port=port) as sent,
     ):
         states: list[Any] = []
         reports: list[Any] = []
         topics.GAME_STATE.subscribe_from(node, states.append)
         topics.DIAGNOSTICS.subscribe_from(node, reports.append)
-        sent.send(packet())
+        sent.send(write(7, 3))
         until(lambda: bool(states))
-        assert (states[0].phase, states[0].own_score, states[0].stale) == (3, 2, False)
+        assert (states[0].phase, states[0].own_score, states[0].stale) == (3, 3, False)
         replies: list[Any] = []
         until(lambda: bool(replies.extend(sent.replies()) or replies))
         assert replies == [Reply(25, 1)]
-        for wrong, words in ((b"RGme\x0c" + bytes(683), "version is 12"), (packet()[:50], "is 50 bytes long")):
+
+        def values(name: str) -> list[str]:
+            return [value.value for report in reports for value in report.status[0].values if value.key == name]
+
+        for wrong, fault, words in (
+            (b"RGme\x0b" + bytes(683), "version", "version is 11; expected one of: 7, 8, 12, 18, 19, 20"),
+            (write(20, 3)[:50], "size", "version 20 is 50 bytes long; expected 158"),
+            (write(12, 3, own=24), "team", "packet is for teams 12 (colour 0) and 24 (colour 1); expected 25"),
+        ):
             sent.send(wrong)
-            until(lambda words=words: any(words in status.message for report in reports for status in report.status))
-        sent.send(packet(4))
+            until(lambda words=words: any(words in report.status[0].message for report in reports))
+            for _ in range(20):
+                sent.send(wrong)
+            until(lambda fault=fault: "21" in values(f"rejected packets ({fault})"))
+            assert capfd.readouterr().err.count(words) == 1  # in the log
+        sent.send(write(7, 4))
         until(lambda: len(states) == 2)
         assert states[1].phase == 4
 
@@ -114,7 +124,7 @@ def test_game_input_says_when_the_referee_is_silent() -> None:
     with running(GameInputNode, f"port:={port}", "stale_after:=0.3") as (node, until), RefereeSocket(port=port) as sent:
         states: list[Any] = []
         topics.GAME_STATE.subscribe_from(node, states.append)
-        sent.send(packet())
+        sent.send(write(7, 3))
         until(lambda: len(states) == 2)
         assert [state.stale for state in states] == [False, True]
 

@@ -17,7 +17,7 @@ from tulip_sim.bench.runner import Row
 from tulip_sim.bench.strategy_gaze import Gaze, StrategyGaze
 from tulip_sim.search_coverage import Coverage, CoverageParameters, search_coverage
 from tulip_strategy.behaviour.gaze import look_at_ball, track_ball
-from tulip_strategy.interface import GamePhase, GameState, UserCommand, UserRequest
+from tulip_strategy.interface import GamePhase, GameState, Penalty, SecondaryState, UserCommand, UserRequest
 from tulip_strategy.parameters import StrategyParameters
 from tulip_strategy.strategy import Strategy
 from tulip_vision.lens import head_camera_lens
@@ -153,7 +153,9 @@ def search(seed: int) -> Row:
     bearing, distance = math.atan2(*play.ball_in_footprint()[1::-1]), float(np.hypot(*play.ball_in_footprint()[:2]))
 
     def decide(now: HeadPlay) -> tuple[HeadCommand, Velocity]:
-        game = GameState(now.stamp, 7, GamePhase.PLAYING, True, True, 1, 150, 0, 0, 0, 0)
+        game = GameState(
+            now.stamp, 7, GamePhase.PLAYING, True, True, SecondaryState.PENALTY_SHOOT, 150, 0, 0, Penalty.NONE, 0
+        )
         decision = strategy.decide(now.stamp, now.state, game, user, None)
         return decision.head, decision.walk.velocity
 

@@ -46,6 +46,7 @@ def build_tree(context: Context) -> Behaviour:
             _when("no world state", context, lambda c: c.world is None, Act("stand", context, _rest)),
             _when("no referee", context, _without_referee, Act("stand", context, _rest)),
             _when("penalised", context, lambda c: c.game is not None and c.game.penalty != 0, _still("stand", context)),
+            _when("halted", context, lambda c: c.game is not None and c.game.halted, _still("stand still", context)),
             _when("initial", context, _in_phase(GamePhase.INITIAL), Act("stand", context, _rest)),
             _when("ready", context, _in_phase(GamePhase.READY), Act("go to place", context, _go_to_place)),
             _when("set", context, _in_phase(GamePhase.SET), _still("stand still", context)),
