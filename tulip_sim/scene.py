@@ -251,7 +251,7 @@ class Body:
         return Boxes(transforms, self._sizes, self._colours)
 
     def as_others_see_it(self, team_colour: str) -> Body:
-        """Return the body of such a robot in a team's colour, as others see it in a match: head and all, and with `MATCH_MARKERS`."""
+        """Return the body of such a robot in a team's colour with its head and `MATCH_MARKERS`, as in a match."""
         if team_colour not in self._figures:
             self._figures[team_colour] = Body(self._robot, team_colour, HIDDEN, worn=MATCH_MARKERS)
         return self._figures[team_colour]
