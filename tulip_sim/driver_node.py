@@ -172,7 +172,7 @@ class DriverNode(ComponentNode):
             self._referee_socket.replies()  # emptied, so that they do not fill the system's buffer
         if self._tick % SLOW_TICKS == 0:
             self._clock_sender.publish(Clock(clock=to_message(truth.stamp)))
-            self._truth.publish(truth_to_message(truth, self._referee))
+            self._truth.publish(truth_to_message(truth, self._referee.verdict()))
         if self._settings.camera and self._tick % CAMERA_TICKS == 0:
             picture = self._camera.render(truth, self._camera_rng)
             self._pictures.publish(picture_to_message(picture, truth.stamp))

@@ -1,9 +1,10 @@
-"""What a referee sees with its own eyes, in a trial and in a match alike: goals, balls that are out, robots that lie."""
+"""What a referee sees by itself, in a trial and in a match alike: goals, balls that are out, robots that lie."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,25 @@ from tulip_description.field import Field, Goal
 
 Array = NDArray[np.float64]
 SECOND = 10**9  # [ns]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a referee says about one robot at one instant.
+
+    Attributes:
+        outcome: How the trial ended, "" while it runs.
+        score: Goals of the robot's own team and of the other.
+        lying: Whether the robot lies on the ground.
+        falls: How often it fell since the trial's start.
+        played: Time since the beginning of play [s].
+    """
+
+    outcome: str
+    score: tuple[int, int]
+    lying: bool
+    falls: int
+    played: float
 
 
 def in_goal(ball: Array, goal: Goal, field: Field) -> bool:

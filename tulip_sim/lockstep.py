@@ -92,4 +92,4 @@ class Lockstep(RobotStack):
         self.world.close()
 
     def _tell_truth(self, stamp: int) -> None:
-        self._tell("ground_truth", stamp, (self.world.truth(), self.referee))
+        self._tell("ground_truth", stamp, (self.world.truth(), self.referee.verdict()))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from tulip_description.field import Field
-from tulip_sim.judging import SECOND, FallWatch, OutWatch, in_goal
+from tulip_sim.judging import SECOND, FallWatch, OutWatch, Verdict, in_goal
 from tulip_sim.referee_packets import PLAYERS, write_packet
 from tulip_sim.situation import PlayerSituation, Removal, Situation, TeamSituation
 from tulip_sim.truth import Truth
@@ -65,6 +65,8 @@ class Result(Enum):
     OUT = "out"
     TIME = "time"
     FALLEN = "fallen"
+    LEFT = "striker left the field"
+    HELD = "held"
 
 
 @dataclass(frozen=True)
@@ -157,6 +159,11 @@ class Referee:
     def played(self) -> float:
         """Time since the beginning of play [s]; what it was at the end once the trial is over."""
         return self._outcome.seconds if self._outcome is not None else self._playing_time()
+
+    def verdict(self) -> Verdict:
+        """Return what there is to say about the robot now."""
+        outcome = "" if self._outcome is None else self._outcome.result.value
+        return Verdict(outcome, self.score, self.lying, self.falls, self.played)
 
     def remove(self, reason: Removal, seconds: float) -> None:
         """Take the striker out of play for a time [s]; `Removal.NONE` sets it back in."""
