@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+import json
 import math
 
 import cv2
@@ -10,12 +11,14 @@ import numpy as np
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, CompressedImage
+from std_msgs.msg import String
 
 from tulip_description import frames
 from tulip_description.planar import Pose2D
 from tulip_msgs.msg import GroundTruth
 from tulip_ros.time import header, stamp_of
 from tulip_sim.judging import Verdict
+from tulip_sim.match_report import MatchReport
 from tulip_sim.truth import Truth
 from tulip_vision.lens import Lens
 
@@ -37,6 +40,16 @@ def lens_to_message(lens: Lens, stamp: int) -> CameraInfo:
     matrix = np.hstack([lens.camera_matrix, np.zeros((3, 1))])
     message.r, message.p = np.eye(3).ravel(), matrix.ravel()
     return message
+
+
+def report_to_message(report: MatchReport) -> String:
+    """Return all that the referee of a match has said, as JSON."""
+    return String(data=json.dumps(report.as_dict()))
+
+
+def report_from_message(message: String) -> MatchReport:
+    """Return the report of a message."""
+    return MatchReport.from_dict(json.loads(message.data))
 
 
 def truth_to_message(truth: Truth, verdict: Verdict) -> GroundTruth:

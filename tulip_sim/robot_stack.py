@@ -152,6 +152,7 @@ class RobotStack:
     def told_to_stand_at(self, pose: Pose2D) -> None:
         """Forget where robot, ball and opponents are: the robot was put down at a pose in its own map."""
         self.world_model = WorldModel(self._settings.worldmodel, self._field, pose)
+        self._tell("initialpose", self.world.stamp, pose)
 
     def close(self) -> None:
         """End the process of the eyes, if there is one."""
