@@ -94,6 +94,10 @@ class FallWatch:
             self.since = stamp
             self.falls += 1
 
+    def lift(self) -> None:
+        """Somebody holds the robot: it does not lie, and does not fall."""
+        self.since = None
+
     def lying_for(self, now: int) -> float:
         """Return for how long it has lain [s], 0 while it is up."""
         return 0.0 if self.since is None else (now - self.since) / SECOND

@@ -81,6 +81,7 @@ class MatchReferee:
         self._told: object = None
         self._now = 0
         self._orders: list[Order] = []
+        self._in_hands_until = [0, 0]  # [ns]
         self._scored: tuple[list[bool], list[bool]] = ([], [])
         self._began: int | None = None
         self._trial = 0
@@ -153,7 +154,10 @@ class MatchReferee:
                 return self.update(truths)
         else:
             for robot in TEAMS:
-                self._falls[robot].see(truths[robot].base_orientation, now)
+                if now < self._in_hands_until[robot]:
+                    self._falls[robot].lift()
+                else:
+                    self._falls[robot].see(truths[robot].base_orientation, now)
             if self.phase is GamePhase.PLAYING:
                 self._watch(truths)
                 self._judge(truths)
@@ -210,9 +214,7 @@ class MatchReferee:
         self._held_since: int | None = None
         self._told_fall = [False, False]
         roles = self.roles
-        self._orders.append(
-            Order(tuple(SetDown(team, self._places[team], roles[team]) for team in TEAMS), self._ball_place)
-        )
+        self._order([SetDown(team, self._places[team], roles[team]) for team in TEAMS], self._ball_place)
 
     def _watch(self, truths: Sequence[Truth]) -> None:
         """Look after the robots: who fell, who leaves the field, who may come back."""
@@ -230,6 +232,8 @@ class MatchReferee:
                 if now >= removed.until:
                     self._set_back(robot, truths)
                 continue
+            if now < self._in_hands_until[robot]:
+                continue
             place = truths[robot].footprint
             lies = fall.since is not None
             if lies and not self._told_fall[robot]:
@@ -241,7 +245,7 @@ class MatchReferee:
                 self._remove(robot, Removal.LEFT_FIELD, "has left the field", truths)
             elif robot == self._keeper and not self._moved and self._leaves_area(place):
                 self._say(f"trial {self._trial}: {self._name(robot)} left its goal area too early and is set back")
-                self._orders.append(Order((SetDown(robot, self._places[robot], Role.KEEPER),)))
+                self._order([SetDown(robot, self._places[robot], Role.KEEPER)])
 
     def _judge(self, truths: Sequence[Truth]) -> None:
         """End the trial if the rules do now."""
@@ -307,7 +311,13 @@ class MatchReferee:
         ball = truths[robot].ball_position
         occupied = [(other.x, other.y), (float(ball[0]), float(ball[1]))]
         pose = beside_touch_line(here.x, here.y, outside, occupied, self._field)
-        self._orders.append(Order((SetDown(robot, pose, self.roles[robot]),)))
+        self._order([SetDown(robot, pose, self.roles[robot])])
+
+    def _order(self, robots: Sequence[SetDown], ball: Point | None = None) -> None:
+        """Have robots set down; they are not judged until that is done."""
+        self._orders.append(Order(tuple(robots), ball))
+        for each in robots:
+            self._in_hands_until[each.robot] = self._now + round(self._rules.hands_time * SECOND)
 
     def _score(self, team: int) -> None:
         first, second = self._report.score

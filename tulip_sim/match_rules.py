@@ -36,6 +36,7 @@ class MatchRules:
     packet_period: float = 0.5  # [s] 2 Hz, as the referee program sends
     lying_limit: float = 20.0  # [s] for a robot that fell to get up
     lying_tilt: float = 1.0  # [rad] of the trunk; no gait leans half as far
+    hands_time: float = 1.0  # [s] for people to set a robot down; it is not judged meanwhile
     removal_time: float = 30.0  # [s] out of play
     most_removals: int = 1  # of the striker in one trial; the next one ends the trial
     leave_margin: float = 0.5  # [m] beyond the outer lines; a robot behind a ball at the line stands 0.3 m outside
@@ -53,7 +54,7 @@ class MatchRules:
         Raises:
             ValueError: if one is out of its range.
         """
-        for name in ("initial_time", "ready_time", "set_time", "finished_time"):
+        for name in ("initial_time", "ready_time", "set_time", "finished_time", "hands_time"):
             if not 0.0 <= getattr(self, name) < 3600.0:
                 raise ValueError(f"{name} is {getattr(self, name)} s; expected 0 to 3600")
         for name in ("playing_time", "packet_period", "lying_limit", "removal_time", "held_time"):

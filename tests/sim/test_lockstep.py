@@ -35,6 +35,8 @@ NOT_IN_LOCKSTEP = {
     topics.ROBOT_DESCRIPTION,
     topics.DIAGNOSTICS,
     topics.CLOCK,
+    topics.START_POSE,  # in matches alone
+    topics.REPORT,
 }
 
 
