@@ -1,4 +1,4 @@
-"""People round the field: they switch a robot's legs off, set it on its feet elsewhere, switch it on, and tell it."""
+"""People round the field: they switch a robot's legs off, set it on its feet elsewhere, and let it play on."""
 
 from __future__ import annotations
 
@@ -21,8 +21,11 @@ class Team(Protocol):
     def make_limp(self, robot: int) -> None:
         """Switch the legs off."""
 
+    def let_stand(self, robot: int) -> None:
+        """Have it stand up straight, as soon as it is held upright."""
+
     def let_play(self, robot: int, role: Role) -> None:
-        """Switch the robot on, with what it shall do."""
+        """Let it play, and tell it as what."""
 
     def tell_place(self, robot: int, pose: Pose2D) -> None:
         """Tell the robot where it stands, in its own map."""
@@ -70,8 +73,9 @@ class _Carried:
         since = now - self._from
         if not self._stands and since >= LIMP_TIME:
             world.set_upright(pose, robot)
-            team.let_play(robot, self.order.role)
+            team.let_stand(robot)
             self._stands = True
         elif since >= LIMP_TIME + STANDING_TIME:
             team.tell_place(robot, in_map_of(robot, pose))
+            team.let_play(robot, self.order.role)
             self.done = True

@@ -126,8 +126,12 @@ class LockstepMatch:
         """Switch a robot's legs off."""
         self.robots[robot].ask(UserRequest.LIMP)
 
+    def let_stand(self, robot: int) -> None:
+        """Have a robot stand up straight."""
+        self.robots[robot].ask(UserRequest.STAND)
+
     def let_play(self, robot: int, role: Role) -> None:
-        """Switch a robot on, with what it shall do."""
+        """Let a robot play, and tell it as what."""
         self.robots[robot].ask(UserRequest.PLAY, self.settings.strategy(role))
 
     def tell_place(self, robot: int, pose: Pose2D) -> None:

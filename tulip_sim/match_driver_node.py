@@ -93,8 +93,12 @@ class MatchDriverNode(SimulatorNode):
         """Switch a robot's legs off."""
         self._crews[robot].want(UserRequest.LIMP)
 
+    def let_stand(self, robot: int) -> None:
+        """Have a robot stand up straight."""
+        self._crews[robot].want(UserRequest.STAND)
+
     def let_play(self, robot: int, role: Role) -> None:
-        """Switch a robot on, with what it shall do."""
+        """Let a robot play, and tell it as what."""
         p = self._settings
         self._crews[robot].want(UserRequest.PLAY, p.striker if role is Role.STRIKER else p.keeper)
 
