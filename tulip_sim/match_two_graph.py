@@ -127,7 +127,7 @@ def match_plan(
         }
     }
     if record is not None:
-        own["recorder"] = {"path": str(record.absolute()), "exclude": list(UNRECORDED)}
+        own["recorder"] = {"path": str(record.absolute()), "exclude": list(UNRECORDED), "robots": list(NAMESPACES)}
     for name in ("driver", "recorder"):
         own.setdefault(name, {}).update((values or {}).get(name, {}))
     starts = [
