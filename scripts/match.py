@@ -1,4 +1,4 @@
-"""Play one trial of the dribble and kick competition, record it, and say who scored and how."""
+"""Play a trial of the dribble and kick competition, or a match of two robots; record it, and say who scored and how."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import json
 import os
 import signal
 import sys
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
@@ -23,9 +24,16 @@ from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unkn
 from tulip_sim.lockstep import Settings
 from tulip_sim.match_graph import play_graph
 from tulip_sim.match_lockstep import play_lockstep
+from tulip_sim.match_rules import MatchRules
+from tulip_sim.match_settings import MatchSettings
+from tulip_sim.match_summary import MatchSummary
+from tulip_sim.match_two_graph import match_plan, play_match_graph
 from tulip_sim.perception import PerceptionParameters
+from tulip_sim.play_lockstep_match import play_lockstep_match
+from tulip_sim.robot_stack import RobotSettings
 from tulip_sim.scenario import SCENARIOS
 from tulip_sim.trial import TrialSummary
+from tulip_strategy.behaviour.tree import STRATEGIES
 from tulip_strategy.game_controller import REFEREE_PORT
 
 MODES = ("graph", "lockstep")
@@ -50,8 +58,18 @@ def main(
         str,
         typer.Option(help="camera (pictures and vision), or features made up from the truth: degraded or ideal"),
     ] = "camera",
+    teams: Annotated[
+        int, typer.Option(help="1 for a trial against a figure, 2 for a match of two robots.", min=1, max=2)
+    ] = 1,
+    trials: Annotated[int, typer.Option(help="Of a match, in turns.", min=1)] = MatchRules.trials,
+    playing_time: Annotated[float, typer.Option(help="Of each trial of a match [s].")] = MatchRules.playing_time,
+    striker: Annotated[str, typer.Option(help="Strategy of a match's striker.")] = MatchSettings.striker,
+    keeper: Annotated[str, typer.Option(help="Strategy of a match's goalkeeper.")] = MatchSettings.keeper,
 ) -> None:
-    """Play one trial. The exit code is 0 after a goal, 1 without one, 2 for bad input, 130 after Ctrl-C."""
+    """Play one trial, or a match of two robots.
+
+    The exit code is 0 after a goal or a whole match, 1 after a trial without a goal, 2 for bad input, 130 after Ctrl-C.
+    """
     folder: Path | None = None
     console = Console()
     try:
@@ -63,9 +81,19 @@ def main(
             raise BadInputError(f"--eyes is {eyes!r}; expected one of {', '.join(EYES)}.")
         if mode != "graph" and (parameters or logs):
             raise BadInputError("--parameters and --logs are for nodes; expected --mode graph with them.")
+        if teams == 2:
+            match = match_settings(trials, playing_time, striker, keeper, EYES[eyes])
+            if mode == "graph" and EYES[eyes] is not None:
+                raise BadInputError("--eyes is for one robot, or for --mode lockstep; expected camera with two.")
         if json_path is not None:
             check_writable(json_path, "--json")
-        folder = None if no_record else record or default_folder(seed, mode)
+        folder = None if no_record else record or default_folder(seed, mode if teams == 1 else f"match_{mode}")
+        if teams == 2:
+            result = play_match(seed, mode, match, folder, parameters or (), referee_port, logs, console)
+            report(result.report.verdict, result, console)
+            if json_path is not None:
+                json_path.write_text(json.dumps(result.as_dict(), indent=2) + "\n")
+            return
         with Progress(
             TextColumn("{task.description}", justify="left"),
             BarColumn(bar_width=20),
@@ -102,7 +130,7 @@ def main(
         held = f"; {folder} holds what was played" if folder is not None and folder.exists() else ""
         print(f"stopped{held}", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None
-    report(summary, console)
+    report("GOAL" if summary.scored else "no goal", summary, console)
     if json_path is not None:
         json_path.write_text(json.dumps(summary.as_dict(), indent=2) + "\n")
     raise typer.Exit(0 if summary.scored else 1)
@@ -114,9 +142,58 @@ def default_folder(seed: int, mode: str) -> Path:
     return _environment.ROOT / "recordings" / f"{moment}_{mode}_{seed}"
 
 
-def report(summary: TrialSummary, console: Console) -> None:
-    """Print the summary."""
-    verdict = "GOAL" if summary.scored else "no goal"
+def match_settings(
+    trials: int, playing_time: float, striker: str, keeper: str, perception: PerceptionParameters | None
+) -> MatchSettings:
+    """Return the settings of a match.
+
+    Raises:
+        BadInputError: if they make no match.
+    """
+    for name, strategy in (("--striker", striker), ("--keeper", keeper)):
+        if strategy not in STRATEGIES:
+            raise BadInputError(f"{name} is {strategy!r}; expected one of {', '.join(STRATEGIES)}.")
+    try:
+        rules = MatchRules(trials=trials, playing_time=playing_time)
+    except ValueError as error:
+        raise BadInputError(f"{error}.") from error
+    robot = RobotSettings(perception=perception)
+    return MatchSettings(rules=rules, robots=(robot, robot), striker=striker, keeper=keeper)
+
+
+def play_match(
+    seed: int,
+    mode: str,
+    settings: MatchSettings,
+    folder: Path | None,
+    parameters: Sequence[Path],
+    referee_port: int,
+    logs: Path | None,
+    console: Console,
+) -> MatchSummary:
+    """Play a match of two robots and print the referee's log as it grows."""
+    rules = settings.rules
+    seconds = rules.initial_time + rules.ready_time + rules.set_time + rules.playing_time + rules.finished_time
+    columns = (TextColumn("{task.description}"), BarColumn(bar_width=20), TextColumn("{task.completed:6.1f} s"))
+    with Progress(*columns, TimeElapsedColumn(), console=console, transient=True) as bar:
+        task = bar.add_task("starting", total=rules.trials * seconds)
+
+        def show(time: float, doing: str) -> None:
+            bar.update(task, completed=time, description=doing)
+
+        def say(line: str) -> None:
+            console.print(line, highlight=False, markup=False)
+
+        if mode == "graph":
+            ports = (referee_port, referee_port + 2)
+            plan = match_plan(seed, rules, folder, parameters, None, ports, settings.striker, settings.keeper)
+            return play_match_graph(plan, seed, folder, show, say, logs)
+        beside = (os.cpu_count() or 1) > 1 and all(robot.perception is None for robot in settings.robots)
+        return play_lockstep_match(seed, settings, folder, show, say, eyes_beside=beside)
+
+
+def report(verdict: str, summary: TrialSummary | MatchSummary, console: Console) -> None:
+    """Print how it ended, and the summary."""
     console.print(f"[bold]{verdict}[/] (seed {summary.seed}, {summary.mode})")
     for name, value in summary.lines():
         console.print(f"{name:<21}{value}", highlight=False, markup=False, soft_wrap=True)

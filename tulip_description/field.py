@@ -223,6 +223,10 @@ class Field:
         """Return the same field without landmark poles."""
         return replace(self, poles=())
 
+    def turned(self) -> Field:
+        """Return the same field as the other team sees it: its map is turned by half a circle."""
+        return replace(self, poles=tuple(replace(pole, x=-pole.x, y=-pole.y) for pole in self.poles))
+
     @property
     def carpet_length(self) -> float:
         """Of the carpet with its border, along x [m]."""

@@ -37,6 +37,7 @@ class ProcessState:
         restarts: How many times it was started again.
         uptime: Since its last start [s], or 0.
         exit_code: Of its last end (minus the signal's number), or None.
+        namespace: As in "striker", or "".
     """
 
     name: str
@@ -45,6 +46,7 @@ class ProcessState:
     restarts: int
     uptime: float
     exit_code: int | None
+    namespace: str = ""
 
 
 class Launcher:
@@ -107,7 +109,7 @@ class Launcher:
 
     def stop(self) -> None:
         """End all processes: the recorder last, so that it sees the others end. Leave nothing of theirs behind."""
-        recorders = [process for process in self._processes if process.name == "recorder"]
+        recorders = [process for process in self._processes if process.is_recorder]
         _end([process for process in self._processes if process not in recorders])
         _end(recorders)
         if any(process.was_killed for process in self._processes):
@@ -116,9 +118,10 @@ class Launcher:
 
 class _Process:
     def __init__(self, start: Start, log_folder: Path) -> None:
-        self.name = start.name
-        self._log = log_folder / f"{start.name}.log"
-        self._command = start.command(log_folder / f"{start.name}.yaml")
+        self.name, self._start = start.full_name, start
+        file = self.name.replace("/", ".")
+        self._log = log_folder / f"{file}.log"
+        self._command = start.command(log_folder / f"{file}.yaml")
         self._process: subprocess.Popen[bytes] | None = None
         self._started = 0.0
         self._restart_at = 0.0
@@ -128,6 +131,10 @@ class _Process:
         self._ended = False
         self._exit_code: int | None = None
         self.was_killed = False  # at any time: it could not remove its shared memory then
+
+    @property
+    def is_recorder(self) -> bool:
+        return self._start.name == "recorder"
 
     def start(self) -> None:
         with open(self._log, "ab") as log:
@@ -174,12 +181,13 @@ class _Process:
         alive = self._process is not None
         words = "running" if alive else "ended" if self._ended else "given up" if self._given_up else "waiting"
         return ProcessState(
-            self.name,
+            self._start.name,
             words,
             self._process.pid if self._process else 0,
             max(self._starts - 1, 0),
             monotonic() - self._started if alive else 0.0,
             self._exit_code,
+            self._start.namespace,
         )
 
     def signal(self, number: signal.Signals) -> None:

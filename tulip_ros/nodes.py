@@ -55,8 +55,11 @@ NODES: dict[str, NodeEntry] = {
 }
 """All nodes but the driver, by name."""
 
-DRIVERS: dict[str, NodeEntry] = {"sim": NodeEntry("driver", "tulip_sim.driver_node", playing=False)}
-"""What can stand for the robot's body: each is a node named "driver"."""
+DRIVERS: dict[str, NodeEntry] = {
+    "sim": NodeEntry("driver", "tulip_sim.driver_node", playing=False),
+    "match": NodeEntry("driver", "tulip_sim.match_driver_node", playing=False),
+}
+"""What can stand for the robot's body, or for the bodies of two: each is a node named "driver"."""
 
 ROBOT: tuple[str, ...] = tuple(name for name, entry in NODES.items() if entry.playing)
 """The nodes that make the robot play, in the order of the data flow."""

@@ -17,7 +17,7 @@ from tulip_ros.nodes import DRIVERS, NODES, ROBOT, NodeEntry, find_driver, find_
 Values = Mapping[str, Any]
 EVERY_NODE = "/**"
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*")
-SIMULATED = frozenset({"sim"})
+SIMULATED = frozenset({"sim", "match"})
 """Drivers that publish /clock, which the other nodes follow then."""
 
 
@@ -46,6 +46,11 @@ class Start:
     parameters: Values
     namespace: str
 
+    @property
+    def full_name(self) -> str:
+        """Name with namespace, as in "striker/vision"."""
+        return f"{self.namespace}/{self.name}" if self.namespace else self.name
+
     def command(self, parameter_file: Path) -> list[str]:
         """Write the parameters to a file and return the command line that uses it."""
         parameter_file.write_text(yaml.safe_dump({EVERY_NODE: {"ros__parameters": dict(self.parameters)}}))
@@ -59,6 +64,7 @@ def make_plan(
     namespace: str = "",
     parameter_files: Sequence[Path] = (),
     values: Mapping[str, Values] | None = None,
+    simulated: bool | None = None,
 ) -> tuple[Start, ...]:
     """Return the nodes to start, in order.
 
@@ -68,10 +74,12 @@ def make_plan(
         namespace: For all nodes, as in "striker".
         parameter_files: YAML files, later ones win.
         values: Parameters by node name, which win over the files.
+        simulated: Whether the nodes follow /clock; None: they do if the driver publishes it.
 
     Raises:
         BadInputError: for an unknown name, a bad namespace, or a file that cannot be used.
     """
+    follows = driver in SIMULATED if simulated is None else simulated
     entries = [find_driver(driver)] if driver else []
     entries += [find_node(name) for name in dict.fromkeys(nodes or ROBOT)]
     entries.sort(key=lambda entry: entry.name != "recorder")  # starts first, so that it misses nothing
@@ -81,7 +89,7 @@ def make_plan(
         given.append(values)
     starts = []
     for entry in entries:
-        merged: dict[str, Any] = {"use_sim_time": driver in SIMULATED and entry.name != "driver"}
+        merged: dict[str, Any] = {"use_sim_time": follows and entry.name != "driver"}
         own = entry.default_parameters
         for layer in ([read_parameters(own)] if own else []) + given:
             merge(merged, layer.get(EVERY_NODE, {}))

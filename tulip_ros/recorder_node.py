@@ -34,6 +34,7 @@ class RecorderParameters:
         start: Begin a recording at the start; otherwise the service start_recording does.
         include: Regular expressions; a topic must match one of them (whole name). None: every topic.
         exclude: Regular expressions; a topic must match none of them.
+        robots: Namespaces, below the node's own, of robots whose topics are subscribed before they appear.
     """
 
     folder: str = "recordings"
@@ -41,6 +42,7 @@ class RecorderParameters:
     start: bool = True
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
+    robots: tuple[str, ...] = ("",)
 
     def __post_init__(self) -> None:
         for expression in (*self.include, *self.exclude):
@@ -79,7 +81,8 @@ class RecorderNode(ComponentNode):
         if self.settings.start:
             self.begin(self.settings.path)
         # The topics of this project are subscribed before anyone publishes, so that no first message is lost.
-        for topic in topics.TOPICS:
+        expected = [topic.within(robot) for robot in self.settings.robots for topic in topics.TOPICS]
+        for topic in {topic.name: topic for topic in expected}.values():
             self.subscribe(
                 self.resolve_topic_name(topic.name), topic.type_name, topic.quality, ReliabilityPolicy.RELIABLE
             )

@@ -97,6 +97,10 @@ class Topic:
         """The type as ROS writes it: package/msg/Name."""
         return type_name(self.message)
 
+    def within(self, namespace: str) -> Topic:
+        """Return this topic in a robot's namespace, for a node outside it; "" changes nothing, nor what all share."""
+        return replace(self, name=f"{namespace}/{self.name}") if namespace and self.name[0] != "/" else self
+
     def publish_from(self, node: Node) -> Publisher:
         """Create this topic's publisher in a node."""
         return node.create_publisher(self.message, self.name, self.quality.profile())
@@ -202,6 +206,17 @@ BEHAVIOUR_TREE = Topic(
 )
 ROBOT_DESCRIPTION = Topic("robot_description", String, LATCHED, ("driver",), (), "URDF of the robot, for viewers")
 DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, EVENTS, ALL_NODES, (), "health of each node, once a second")
+START_POSE = Topic(
+    "initialpose",
+    PoseWithCovarianceStamped,
+    LATCHED,
+    ("driver",),
+    ("worldmodel",),
+    "base_footprint in map, where people have set the robot down during a match; viewers send it, too",
+)
+REPORT = Topic(
+    "referee/report", String, LATCHED, ("driver",), (), "match of two robots: all that the referee has said, as JSON"
+)
 GROUND_TRUTH = Topic(
     "ground_truth",
     GroundTruth,
@@ -236,6 +251,8 @@ TOPICS: tuple[Topic, ...] = (
     BEHAVIOUR_TREE,
     ROBOT_DESCRIPTION,
     DIAGNOSTICS,
+    START_POSE,
+    REPORT,
     GROUND_TRUTH,
     CLOCK,
 )

@@ -1,72 +1,34 @@
-"""The whole robot in one process: the same cores as the graph, wired in the order of the data flow.
+"""A whole trial in one process: one robot's cores, the same as in the graph, with its world and a referee.
 
 Deterministic: the same scenario, settings and seed give the same trial, bit for bit, on one machine. What
-takes time in the graph takes as long here: a joint command acts one tick after the sensors that it
-answers, features arrive some ticks after their picture.
+takes time in the graph takes as long here.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 
-import numpy as np
-from numpy.typing import NDArray
-
-from tulip_description.camera_mount import load_mount
-from tulip_description.camera_pose import camera_in_footprint
-from tulip_description.field import Field, load_field
+from tulip_description.field import load_field
 from tulip_description.planar import Pose2D
-from tulip_description.robot import Robot, load_robot
-from tulip_description.robot_io import JointCommand
-from tulip_motion.head import HeadMovement, HeadParameters
-from tulip_motion.interface import HeadCommand, HeadMode, MotionState
-from tulip_motion.motion import Motion
-from tulip_motion.parameters import MotionParameters
-from tulip_sim.camera import CameraParameters
-from tulip_sim.eyes import LATENCY, Eyes, EyesBeside, EyesParameters, OwnEyes, Picture, TruthEyes
+from tulip_description.robot import load_robot
 from tulip_sim.parameters import WorldParameters
-from tulip_sim.perception import PerceptionParameters
 from tulip_sim.referee import Outcome, Referee, RefereeParameters
+from tulip_sim.robot_stack import Listener, RobotSettings, RobotStack
 from tulip_sim.scenario import Scenario
-from tulip_sim.timing import CAMERA_TICKS, DECISION_TICKS, SLOW_TICKS, TICK
+from tulip_sim.timing import TICK
 from tulip_sim.world import World
-from tulip_strategy.game_input import GameInput, GameInputParameters
-from tulip_strategy.interface import Decision, GameState, UserCommand, UserRequest
-from tulip_strategy.parameters import StrategyParameters
-from tulip_strategy.strategy import Strategy
-from tulip_vision.features import Features
-from tulip_vision.pipeline import VisionParameters
-from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParameters
-from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
-
-Listener = Callable[[str, int, object], None]
-"""Is told everything that passes between components: topic name, stamp [ns], object."""
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Parameters of all cores.
-
-    With `perception` no pictures are rendered and no vision runs; features come from the truth instead, as good as it
-    says. For fast tests of behaviour only; None, the default, is the camera with real vision.
-    """
+class Settings(RobotSettings):
+    """Parameters of the robot's cores, of the world and of the referee."""
 
     world: WorldParameters = field(default_factory=WorldParameters)
-    camera: CameraParameters = field(default_factory=CameraParameters)
     referee: RefereeParameters = field(default_factory=RefereeParameters)
-    vision: VisionParameters = field(default_factory=VisionParameters)
-    worldmodel: WorldModelParameters = field(default_factory=WorldModelParameters)
-    motion: MotionParameters = field(default_factory=MotionParameters)
-    head: HeadParameters = field(default_factory=HeadParameters)
-    strategy: StrategyParameters = field(default_factory=StrategyParameters)
-    game_input: GameInputParameters = field(default_factory=GameInputParameters)
-    perception: PerceptionParameters | None = None
 
 
-class Lockstep:
+class Lockstep(RobotStack):
     """One robot, its world and a referee, advanced together tick by tick."""
 
     def __init__(
@@ -91,34 +53,10 @@ class Lockstep:
             belief: Where the robot is told to stand, if that is not where it stands.
         """
         settings = settings or Settings()
-        robot_field: Field = load_field()
-        robot: Robot = load_robot()
-        self._tell = listener or (lambda topic, stamp, value: None)
-        self.world = World(scenario, settings.world, seed, robot_field, robot)
+        robot_field = load_field()
+        world = World(scenario, settings.world, seed, robot_field, load_robot())
         self.referee = Referee(settings.referee, robot_field)
-        eyes = EyesParameters(settings.camera, settings.vision, seed)
-        if settings.perception is not None:
-            self._eyes: Eyes = TruthEyes(eyes, settings.perception)
-        else:
-            self._eyes = EyesBeside(eyes) if eyes_beside else OwnEyes(eyes)
-        self._poses = PoseBuffer(PoseBufferParameters(), partial(camera_in_footprint, robot, mount=load_mount()))
-        self.world_model = WorldModel(settings.worldmodel, robot_field, belief or scenario.robot)
-        self.motion = Motion(settings.motion, robot)
-        self.head = HeadMovement(settings.head, robot)
-        self.strategy = Strategy(settings.strategy, robot_field)
-        self.game_input = GameInput(settings.game_input)
-        self.user = UserCommand(0, UserRequest.PLAY)
-        self._head_command = HeadCommand(0, HeadMode.HOLD)
-        self._pending: list[JointCommand] = []
-        self._exposed: int | None = None  # stamp of the picture worked on [ns]
-        self._looking = False
-        self._seen: deque[tuple[Picture | None, Features]] = deque()  # not used before their time
-        self._tick = 0
-        self.doing = ""
-        """Active path of the behaviour tree."""
-        self._tell("user_command", 0, self.user)
-        self.refused: list[str] = []
-        """Reasons of joint commands and kicks that were refused."""
+        super().__init__(world, settings, belief or scenario.robot, seed, listener, eyes_beside)
 
     @property
     def stamp(self) -> int:
@@ -127,27 +65,12 @@ class Lockstep:
 
     def step(self) -> None:
         """Advance by one control tick."""
-        tick, tell = self._tick, self._tell
-        sensors = self.world.sensors()
-        for command in self._pending:
-            reason = self.world.apply(command)
-            if reason:
-                self.refused.append(reason)
-        self._pending = [self.motion.tick(sensors)]
-        tell("sensors", sensors.stamp, sensors)
-        tell("legs/joint_command", sensors.stamp, self._pending[0])
-        if tick % SLOW_TICKS == 0:
-            self._slow(sensors.stamp, sensors.joint_positions[12:])
-        self._see(tick % CAMERA_TICKS)
-        if tick % DECISION_TICKS == 0:
-            self._decide(sensors.stamp)
+        self.tick()
         self.world.advance(TICK)
         truth = self.world.truth()
         packet = self.referee.update(truth)
         if packet is not None:
-            self.game_input.receive(packet, truth.stamp)
-            self._tell_game(truth.stamp)
-        self._tick += 1
+            self.hear_referee(packet, truth.stamp)
 
     def play(self, progress: Callable[[Lockstep], None] | None = None, limit: float = 200.0) -> Outcome | None:
         """Play until the referee ends the trial.
@@ -165,66 +88,8 @@ class Lockstep:
 
     def close(self) -> None:
         """Free the physics engine and end the process of the eyes, if there is one."""
-        self._eyes.close()
+        super().close()
         self.world.close()
 
-    def _slow(self, stamp: int, head_positions: NDArray[np.float64]) -> None:
-        """Do what comes at 50 Hz: odometry to the world model and to the camera's pose, and the head."""
-        odometry = self.motion.odometry()
-        self.world_model.add_odometry(odometry)
-        self._poses.add_body(stamp, float(odometry.position[2]), odometry.orientation)
-        self._poses.add_head(stamp, float(head_positions[0]), float(head_positions[1]))
-        command = self.head.update(stamp, self._head_command, head_positions)
-        self._pending.append(command)
-        self._tell("odometry", stamp, odometry)
-        self._tell("motion_state", stamp, (self.motion.state(), odometry.distance))
-        self._tell("head/joint_command", stamp, command)
-        self._tell("ground_truth", stamp, (self.world.truth(), self.referee))
-
-    def _see(self, tick: int) -> None:
-        """Take a picture, look at it as soon as its camera pose is known, and use what was seen when it is due."""
-        now = self.stamp
-        if tick == 0:
-            self._exposed, self._looking = now, False
-            self._eyes.expose(self.world.truth())
-        if self._exposed is not None and not self._looking:
-            pose = self._poses.camera_in_footprint(self._exposed)
-            if not isinstance(pose, MissingPose):
-                if pose[2, 3] > 0.0:
-                    self._eyes.look(self._exposed, pose)
-                    self._looking = True
-                else:
-                    self._exposed = None  # a fallen robot's belief puts the camera below the ground: nothing to see
-        # Vision beside this process has until then to work.
-        if self._exposed is not None and self._looking and now - self._exposed >= min(LATENCY, self._eyes.latency):
-            self._seen.append(self._eyes.collect())
-            self._exposed = None
-        while self._seen and now - self._seen[0][1].stamp >= self._eyes.latency:
-            picture, features = self._seen.popleft()
-            self.world_model.add_features(features)
-            if picture is not None:
-                self._tell("camera/image_raw", features.stamp, picture)
-            self._tell("features", features.stamp, features)
-
-    def _decide(self, stamp: int) -> None:
-        """Let strategy see the world and command the legs and the head."""
-        world = self.world_model.state(stamp)
-        game: GameState | None = self.game_input.state(stamp)
-        state: MotionState = self.motion.state()
-        decision: Decision = self.strategy.decide(stamp, world, game, self.user, state)
-        self.doing = decision.tree
-        self.motion.command(decision.walk)
-        self._head_command = decision.head
-        if decision.kick is not None:
-            reason = self.motion.start_kick(decision.kick)
-            if reason:
-                self.refused.append(f"kick: {reason}")
-        self._tell("world_state", stamp, world)
-        self._tell("walk_command", stamp, decision.walk)
-        self._tell("head_command", stamp, decision.head)
-        self._tell("decision", stamp, decision)
-
-    def _tell_game(self, stamp: int) -> None:
-        game = self.game_input.state(stamp)
-        if game is not None:
-            self._tell("game_state", stamp, game)
+    def _tell_truth(self, stamp: int) -> None:
+        self._tell("ground_truth", stamp, (self.world.truth(), self.referee.verdict()))

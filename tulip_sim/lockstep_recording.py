@@ -22,10 +22,15 @@ from tulip_motion.messages import (
 from tulip_ros import topics
 from tulip_ros.bag import Bag
 from tulip_ros.topics import Topic
-from tulip_sim.messages import jpeg_to_message, truth_to_message
+from tulip_sim.messages import jpeg_to_message, report_to_message, truth_to_message
 from tulip_strategy.messages import decision_to_message, game_state_to_message, user_command_to_message
 from tulip_vision.messages import features_to_message
-from tulip_worldmodel.messages import map_to_odom_message, robot_pose_to_message, world_state_to_message
+from tulip_worldmodel.messages import (
+    map_to_odom_message,
+    robot_pose_to_message,
+    start_pose_to_message,
+    world_state_to_message,
+)
 
 Messages = Iterable[tuple[Topic, Any]]
 
@@ -72,17 +77,25 @@ class LockstepRecording:
             "head_command": lambda stamp, value: [(topics.HEAD_COMMAND, head_command_to_message(value))],
             "decision": lambda stamp, value: [(topics.DECISION, decision_to_message(value))],
             "ground_truth": lambda stamp, value: [(topics.GROUND_TRUTH, truth_to_message(*value))],
+            "initialpose": lambda stamp, value: [(topics.START_POSE, start_pose_to_message(value, stamp))],
+            "referee/report": lambda stamp, value: [(topics.REPORT, report_to_message(value))],
         }
 
-    def write(self, topic: str, stamp: int, value: object) -> None:
+    def write(self, topic: str, stamp: int, value: object, namespace: str = "") -> None:
         """Write what was told on a topic at a stamp [ns].
+
+        Args:
+            topic: As the cores' listener is told.
+            stamp: [ns].
+            value: What was told.
+            namespace: Of the robot; "" for one that is alone, and for what is of no robot.
 
         Raises:
             KeyError: for a topic that has no message.
             OSError: if the file cannot be written.
         """
         for entry, message in self._converters[topic](stamp, value):
-            name = entry.name if entry.name.startswith("/") else f"/{entry.name}"
+            name = f"/{entry.within(namespace).name.lstrip('/')}"
             self._bag.add_topic(name, entry.type_name, entry.quality)
             self._bag.write(name, serialize_message(message), stamp)
         self._bag.flush()

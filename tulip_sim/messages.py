@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+import json
 import math
 
 import cv2
@@ -10,12 +11,14 @@ import numpy as np
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, CompressedImage
+from std_msgs.msg import String
 
 from tulip_description import frames
 from tulip_description.planar import Pose2D
 from tulip_msgs.msg import GroundTruth
 from tulip_ros.time import header, stamp_of
-from tulip_sim.referee import Referee
+from tulip_sim.judging import Verdict
+from tulip_sim.match_report import MatchReport
 from tulip_sim.truth import Truth
 from tulip_vision.lens import Lens
 
@@ -39,11 +42,20 @@ def lens_to_message(lens: Lens, stamp: int) -> CameraInfo:
     return message
 
 
-def truth_to_message(truth: Truth, referee: Referee) -> GroundTruth:
-    """Return what really is, with the referee's view of it."""
-    outcome = referee.outcome
-    own, opponent = referee.score
-    keeper = truth.keeper
+def report_to_message(report: MatchReport) -> String:
+    """Return all that the referee of a match has said, as JSON."""
+    return String(data=json.dumps(report.as_dict()))
+
+
+def report_from_message(message: String) -> MatchReport:
+    """Return the report of a message."""
+    return MatchReport.from_dict(json.loads(message.data))
+
+
+def truth_to_message(truth: Truth, verdict: Verdict) -> GroundTruth:
+    """Return what really is, with what the referee says about it; another robot stands for the keeper."""
+    own, opponent = verdict.score
+    keeper = truth.keeper if truth.keeper is not None or not truth.others else truth.others[0].footprint
     message = GroundTruth(
         header=header(truth.stamp, frames.MAP),
         robot=_pose(truth.base_position, truth.base_orientation),
@@ -52,13 +64,13 @@ def truth_to_message(truth: Truth, referee: Referee) -> GroundTruth:
         ball=_pose(truth.ball_position, truth.ball_orientation),
         ball_twist=_twist(truth.ball_linear_velocity, truth.ball_angular_velocity),
         keeper_present=keeper is not None,
-        robot_fallen=referee.lying,
+        robot_fallen=verdict.lying,
         touches=sum(truth.foot_touches) + truth.body_touches,
-        falls=referee.falls,
+        falls=verdict.falls,
         own_score=own,
         opponent_score=opponent,
-        outcome="" if outcome is None else outcome.result.value,
-        trial_time=referee.played,
+        outcome=verdict.outcome,
+        trial_time=verdict.played,
     )
     if keeper is not None:
         half = keeper.yaw / 2.0

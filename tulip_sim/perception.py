@@ -234,7 +234,7 @@ class Perception:
                 yellow = pole.colours[0] == "yellow"
                 kind = FeatureClass.POLE_YELLOW_BLUE_YELLOW if yellow else FeatureClass.POLE_BLUE_YELLOW_BLUE
                 yield from self._upright(scene, kind, (pole.x, pole.y), pole.height)
-        yield from self._opponent(scene)
+        yield from self._opponents(scene)
         for crossing in self._field.crossings:
             yield from self._spot(scene, CROSSINGS[crossing.kind], (crossing.x, crossing.y), p.crossing_range, ARM)
         for mark in self._field.penalty_marks:
@@ -303,18 +303,18 @@ class Perception:
             feet = [glimpse.rays for left, glimpse in sorted(posts, key=lambda each: not each[0])]
             yield Glimpse(FeatureClass.GOAL, np.concatenate(feet))
 
-    def _opponent(self, scene: _Scene) -> Iterator[Glimpse]:
+    def _opponents(self, scene: _Scene) -> Iterator[Glimpse]:
         keeper = scene.truth.keeper
-        if keeper is None:
-            return
-        facing = scene.eye[:2] - (keeper.x, keeper.y)
-        front = np.array([keeper.x, keeper.y]) + 0.12 * facing / max(float(np.linalg.norm(facing)), 1e-6)
-        points = np.array([[*front, 0.0], [*front, CHEST]])
-        rays, seen = self._visible(scene, points, self._parameters.opponent_range)
-        if seen[1]:
-            below = np.array([[keeper.x, keeper.y, 0.0]]) - scene.eye
-            foot = below @ scene.camera[:3, :3] / np.linalg.norm(below)
-            yield Glimpse(FeatureClass.OPPONENT, foot if seen[0] else rays[1:], footed=bool(seen[0]))
+        standing = [] if keeper is None else [keeper]
+        for place in (*standing, *(other.footprint for other in scene.truth.others)):
+            facing = scene.eye[:2] - (place.x, place.y)
+            front = np.array([place.x, place.y]) + 0.12 * facing / max(float(np.linalg.norm(facing)), 1e-6)
+            points = np.array([[*front, 0.0], [*front, CHEST]])
+            rays, seen = self._visible(scene, points, self._parameters.opponent_range)
+            if seen[1]:
+                below = np.array([[place.x, place.y, 0.0]]) - scene.eye
+                foot = below @ scene.camera[:3, :3] / np.linalg.norm(below)
+                yield Glimpse(FeatureClass.OPPONENT, foot if seen[0] else rays[1:], footed=bool(seen[0]))
 
     def _spot(
         self, scene: _Scene, kind: FeatureClass, place: tuple[float, float], reach: float, size: float

@@ -6,14 +6,13 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from tulip_description.field import Field, Goal
+from tulip_description.field import Field
+from tulip_sim.judging import SECOND, FallWatch, OutWatch, Verdict, in_goal
 from tulip_sim.referee_packets import PLAYERS, write_packet
 from tulip_sim.situation import PlayerSituation, Removal, Situation, TeamSituation
 from tulip_sim.truth import Truth
 from tulip_strategy.game_controller import TeamColour, layout_of
 from tulip_strategy.interface import GamePhase
-
-SECOND = 10**9  # [ns]
 
 
 @dataclass(frozen=True)
@@ -68,6 +67,8 @@ class Result(Enum):
     OUT = "out"
     TIME = "time"
     FALLEN = "fallen"
+    LEFT = "striker left the field"
+    HELD = "held"
 
 
 @dataclass(frozen=True)
@@ -110,10 +111,8 @@ class Referee:
         self._next_packet = 0
         self._told: GamePhase | None = None
         self._outcome: Outcome | None = None
-        self._lying_since: int | None = None
-        self._falls = 0
-        self._was_out = False
-        self._outs = 0
+        self._fall_watch = FallWatch(self._parameters.lying_tilt)
+        self._out_watch = OutWatch(self._field)
         self._penalty: tuple[Removal, int] | None = None
 
     @property
@@ -129,17 +128,17 @@ class Referee:
     @property
     def outs(self) -> int:
         """How often the ball left the field during play."""
-        return self._outs
+        return self._out_watch.count
 
     @property
     def falls(self) -> int:
         """How often the robot fell since the trial's start."""
-        return self._falls
+        return self._fall_watch.falls
 
     @property
     def lying(self) -> bool:
         """Whether the robot lies on the ground."""
-        return self._lying_since is not None
+        return self._fall_watch.since is not None
 
     @property
     def phase(self) -> GamePhase:
@@ -163,6 +162,11 @@ class Referee:
         """Time since the beginning of play [s]; what it was at the end once the trial is over."""
         return self._outcome.seconds if self._outcome is not None else self._playing_time()
 
+    def verdict(self) -> Verdict:
+        """Return what there is to say about the robot now."""
+        outcome = "" if self._outcome is None else self._outcome.result.value
+        return Verdict(outcome, self.score, self.lying, self.falls, self.played)
+
     def remove(self, reason: Removal, seconds: float) -> None:
         """Take the striker out of play for a time [s]; `Removal.NONE` sets it back in."""
         self._penalty = None if reason is Removal.NONE else (reason, self._now + round(seconds * SECOND))
@@ -174,7 +178,7 @@ class Referee:
         self._now = truth.stamp
         if self._penalty is not None and self._now >= self._penalty[1]:
             self._penalty = None
-        self._watch_robot(truth)
+        self._fall_watch.see(truth.base_orientation, truth.stamp)
         if self.phase is GamePhase.PLAYING:
             self._judge(truth)
         if self._now < self._next_packet and self.phase is self._told:
@@ -224,47 +228,21 @@ class Referee:
             return parameters.initial_time + parameters.ready_time - self._elapsed()
         return self._preparation() - self._elapsed() if phase is GamePhase.SET else 0.0
 
-    def _watch_robot(self, truth: Truth) -> None:
-        """Note since when the robot lies, and count the fall."""
-        x, y, _, _ = truth.base_orientation
-        upright = 1.0 - 2.0 * float(x * x + y * y)  # vertical part of the trunk's own z axis
-        if math.acos(max(-1.0, min(1.0, upright))) <= self._parameters.lying_tilt:
-            self._lying_since = None
-        elif self._lying_since is None:
-            self._lying_since = truth.stamp
-            self._falls += 1
-
     def _judge(self, truth: Truth) -> None:
         """End the trial if the rules do now."""
-        lying = self._lying_since is not None and truth.stamp - self._lying_since
-        if self._in_goal(truth, self._field.opponent_goal):
+        ball, field = truth.ball_position, self._field
+        if in_goal(ball, field.opponent_goal, field):
             self._score[0] += 1
             self._end(Result.GOAL, truth)
-        elif self._in_goal(truth, self._field.own_goal):
+        elif in_goal(ball, field.own_goal, field):
             self._score[1] += 1
             self._end(Result.OWN_GOAL, truth)
-        elif self._leaves_field(truth) and self._parameters.ends_when_ball_is_out:
+        elif self._out_watch.leaves(ball) and self._parameters.ends_when_ball_is_out:
             self._end(Result.OUT, truth)
-        elif lying and lying >= self._parameters.lying_limit * SECOND:
+        elif self._fall_watch.lying_for(truth.stamp) >= self._parameters.lying_limit:
             self._end(Result.FALLEN, truth)
         elif self._playing_time() >= self._parameters.playing_time:
             self._end(Result.TIME, truth)
-
-    def _in_goal(self, truth: Truth, goal: Goal) -> bool:
-        """Tell whether the ball is wholly over the goal line, between the posts and under the bar."""
-        x, y, z = (float(value) for value in truth.ball_position)
-        over = goal.outward * (x - goal.x) - self._field.ball_radius > 0.5 * self._field.line_width
-        return over and goal.outward * x < goal.outward * goal.back and abs(y) < 0.5 * goal.width and z < goal.height
-
-    def _leaves_field(self, truth: Truth) -> bool:
-        """Tell whether the ball has just gone wholly over an outer line."""
-        edge = self._field.ball_radius + 0.5 * self._field.line_width
-        x, y = abs(float(truth.ball_position[0])), abs(float(truth.ball_position[1]))
-        out = x > 0.5 * self._field.length + edge or y > 0.5 * self._field.width + edge
-        leaves = out and not self._was_out
-        self._was_out = out
-        self._outs += leaves
-        return leaves
 
     def _end(self, result: Result, truth: Truth) -> None:
         self._outcome = Outcome(
@@ -273,6 +251,6 @@ class Referee:
             sum(truth.foot_touches),
             truth.body_touches,
             truth.keeper_touches,
-            self._falls,
+            self.falls,
         )
         self._scored.append(result is Result.GOAL)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from tulip_ros.errors import BadInputError
 from tulip_ros.health import Health
 from tulip_sim.referee_udp import RefereeSocket
@@ -9,7 +11,9 @@ from tulip_strategy.game_controller import REFEREE_PORT, Rejected
 from tulip_strategy.game_controller.replies import ANSWERS
 
 
-def open_referee(address: str, port: int, version: int, reply_port: int = 0) -> RefereeSocket:
+def open_referee(
+    address: str, port: int, version: int, reply_port: int = 0, further_ports: Sequence[int] = ()
+) -> RefereeSocket:
     """Open the socket of a referee who speaks a version.
 
     Args:
@@ -17,6 +21,7 @@ def open_referee(address: str, port: int, version: int, reply_port: int = 0) -> 
         port: Their port.
         version: Of the packets.
         reply_port: Where replies come in; 0 for the port that the version has.
+        further_ports: Of further robots on the same machine.
 
     Raises:
         BadInputError: if the reply port cannot be opened.
@@ -24,7 +29,7 @@ def open_referee(address: str, port: int, version: int, reply_port: int = 0) -> 
     reply_port = reply_port or ANSWERS[version][1]
     try:
         # Robots on this machine hold their own port themselves: they answer where the packets come from.
-        return RefereeSocket(address, port, 0 if reply_port == REFEREE_PORT else reply_port)
+        return RefereeSocket(address, port, 0 if reply_port == REFEREE_PORT else reply_port, further_ports)
     except OSError as error:
         raise BadInputError(
             f"The referee cannot hear robots on UDP port {reply_port}: {error.strerror or error}. End the program that "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from collections.abc import Sequence
 from ipaddress import ip_address
 
 from tulip_strategy.game_controller import REFEREE_PORT, Rejected, Reply, decode_reply
@@ -14,7 +15,13 @@ REPLY_SIZE = 512  # [B] more than any reply has
 class RefereeSocket:
     """A UDP socket that speaks as the referee program does."""
 
-    def __init__(self, address: str = "127.0.0.1", port: int = REFEREE_PORT, reply_port: int = 0) -> None:
+    def __init__(
+        self,
+        address: str = "127.0.0.1",
+        port: int = REFEREE_PORT,
+        reply_port: int = 0,
+        further_ports: Sequence[int] = (),
+    ) -> None:
         """Open the socket.
 
         Args:
@@ -23,10 +30,12 @@ class RefereeSocket:
             reply_port: Where they send their replies: 3939 from version 12 on. 0 for those of versions 7 and 8, which
                 robots on this machine send to where the packets come from.
 
+            further_ports: Of further robots on one machine, where a port can have one listener only.
+
         Raises:
             OSError: if the reply port is in use.
         """
-        self._target = (address, port)
+        self._targets = [(address, each) for each in (port, *further_ports)]
         self._listening = _listen(address, reply_port) if reply_port else None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
@@ -36,10 +45,11 @@ class RefereeSocket:
 
     def send(self, packet: bytes) -> None:
         """Send a packet; a network that does not take it is counted, since the next one follows soon."""
-        try:
-            self._socket.sendto(packet, self._target)
-        except OSError:
-            self.lost += 1
+        for target in self._targets:
+            try:
+                self._socket.sendto(packet, target)
+            except OSError:
+                self.lost += 1
 
     def replies(self) -> list[Reply | Rejected]:
         """Return what robots have sent since the last time."""

@@ -14,7 +14,7 @@ from tulip_description.field import Field, Goal
 from tulip_description.keeper import keeper_parts
 from tulip_description.planar import Pose2D
 from tulip_description.quaternion import quaternion_matrix
-from tulip_description.robot import Robot
+from tulip_description.robot import Box, Robot
 from tulip_sim.solids import Colour, View
 from tulip_sim.truth import Truth
 
@@ -35,6 +35,13 @@ KEEPER_SHADOW = 0.26  # [m]
 FOOT_SHADOW = 0.14  # [m]
 THREAD_GAP = 0.15  # [m] between two threads of a net
 UNSEEN = ("neck", "head")  # links that carry the camera; it does not see them
+MATCH_MARKERS = (
+    ("electronics", Box((0.006, 0.20, 0.16), (0.054, 0.0, 0.0), "marker", False)),
+    ("left_arm", Box((0.07, 0.006, 0.18), (0.0, 0.039, 0.08), "marker", False)),
+    ("right_arm", Box((0.07, 0.006, 0.18), (0.0, -0.039, 0.08), "marker", False)),
+)
+"""Link and box of the markers that a robot wears in a match on chest and arms, so that all sides show its team; the one
+on the back is its own (robot.yaml)."""
 HIDDEN = ("neck",)  # stands inside the head, where drawing from far to near knows no order
 
 
@@ -177,6 +184,7 @@ class Body:
         team_colour: str,
         unseen: Collection[str] = UNSEEN,
         mount: MountOffsets | None = None,
+        worn: Sequence[tuple[str, Box]] = (),
     ) -> None:
         """Collect the boxes.
 
@@ -185,6 +193,7 @@ class Body:
             team_colour: Of its marker.
             unseen: Links whose boxes are left out.
             mount: How the camera really sits on the head; none: as drawn.
+            worn: What it wears besides, with the link that each thing is fixed to.
 
         Raises:
             ValueError: if the robot has no camera.
@@ -202,6 +211,7 @@ class Body:
         self._steps[:, :3, 3] = [joint.origin for joint in robot.joints]
         self._crosses = np.array([_cross_matrix(joint.axis) for joint in robot.moving])
         seen = [(link.name, box) for link in robot.links for box in link.boxes if link.name not in unseen]
+        seen += list(worn)
         self._links = [name for name, _ in seen]
         self._centres = np.array([box.centre for _, box in seen])
         self._sizes = np.array([box.size for _, box in seen])
@@ -241,9 +251,9 @@ class Body:
         return Boxes(transforms, self._sizes, self._colours)
 
     def as_others_see_it(self, team_colour: str) -> Body:
-        """Return the body of such a robot in a team's colour, head and all, as others see it."""
+        """Return the body of such a robot in a team's colour with its head and `MATCH_MARKERS`, as in a match."""
         if team_colour not in self._figures:
-            self._figures[team_colour] = Body(self._robot, team_colour, HIDDEN)
+            self._figures[team_colour] = Body(self._robot, team_colour, HIDDEN, worn=MATCH_MARKERS)
         return self._figures[team_colour]
 
     def feet(self, links: dict[str, Array]) -> list[tuple[float, float]]:

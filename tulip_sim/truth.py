@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from tulip_description.planar import Pose2D
 from tulip_description.quaternion import pose_on_ground
 
 Array = NDArray[np.float64]
+HALF_TURN = np.array([-1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,10 @@ class OtherRobot:
     def footprint(self) -> Pose2D:
         """base_footprint in map."""
         return pose_on_ground(self.base_position, self.base_orientation)
+
+    def turned(self) -> OtherRobot:
+        """Return the same in a map that is turned by half a circle."""
+        return OtherRobot(HALF_TURN * self.base_position, _turned(self.base_orientation), self.joint_positions)
 
 
 @dataclass(frozen=True)
@@ -81,3 +87,27 @@ class Truth:
     def footprint(self) -> Pose2D:
         """base_footprint in map: where the robot is and looks to, seen from above."""
         return pose_on_ground(self.base_position, self.base_orientation)
+
+    def turned(self) -> Truth:
+        """Return the same in the map of the team that attacks the other goal: turned by half a circle."""
+        keeper = self.keeper
+        return replace(
+            self,
+            base_position=HALF_TURN * self.base_position,
+            base_orientation=_turned(self.base_orientation),
+            base_linear_velocity=HALF_TURN * self.base_linear_velocity,
+            base_angular_velocity=HALF_TURN * self.base_angular_velocity,
+            ball_position=HALF_TURN * self.ball_position,
+            ball_orientation=_turned(self.ball_orientation),
+            ball_linear_velocity=HALF_TURN * self.ball_linear_velocity,
+            ball_angular_velocity=HALF_TURN * self.ball_angular_velocity,
+            keeper=None if keeper is None else Pose2D(-keeper.x, -keeper.y, keeper.yaw + math.pi),
+            keeper_path=tuple((-x, -y) for x, y in self.keeper_path),
+            others=tuple(other.turned() for other in self.others),
+        )
+
+
+def _turned(orientation: Array) -> Array:
+    """Return a quaternion (4,) x, y, z, w after a turn by half a circle about map's z axis: (0, 0, 1, 0) times it."""
+    x, y, z, w = orientation.tolist()
+    return np.array([-y, x, w, -z])

@@ -36,6 +36,7 @@ class StrategyNodeParameters(StrategyParameters):
     """Parameters of strategy and of its node."""
 
     field_file: str = ""  # "" for the AdultSize field of 2013
+    field_turned: bool = False  # the team attacks the goal at -x of the file, so its map is turned by half a circle
 
 
 class StrategyNode(ComponentNode):
@@ -46,9 +47,10 @@ class StrategyNode(ComponentNode):
         super().__init__("strategy")
         self._settings = self.load(StrategyNodeParameters())
         try:
-            self._field = load_field(self._settings.field_file or None)
+            field = load_field(self._settings.field_file or None)
         except FieldError as error:
             raise BadInputError(f"Parameter field_file of node 'strategy': {error}") from error
+        self._field = field.turned() if self._settings.field_turned else field
         self._user = UserCommand(0, UserRequest.STOP)
         self.begin_anew()
         self._walk = self.sender(topics.WALK_COMMAND)

@@ -9,6 +9,8 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformSt
 from tf2_msgs.msg import TFMessage
 
 from tulip_description.frames import MAP, ODOM
+from tulip_description.planar import Pose2D
+from tulip_description.quaternion import pose_on_ground
 from tulip_msgs.msg import Features as FeaturesMessage
 from tulip_msgs.msg import ObjectEstimate as ObjectEstimateMessage
 from tulip_msgs.msg import WorldState as WorldStateMessage
@@ -90,6 +92,23 @@ def map_to_odom_message(world: WorldState) -> TFMessage:
     message.transform.translation.y = odom.y
     message.transform.rotation = quaternion(odom.yaw)
     return TFMessage(transforms=[message])
+
+
+def start_pose_to_message(pose: Pose2D, stamp: int) -> PoseWithCovarianceStamped:
+    """Return where the robot was set down, base_footprint in map, at a stamp [ns]."""
+    message = PoseWithCovarianceStamped(header=header(stamp, MAP))
+    message.pose.pose.position.x, message.pose.pose.position.y = pose.x, pose.y
+    message.pose.pose.orientation = quaternion(pose.yaw)
+    return message
+
+
+def start_pose_from_message(message: PoseWithCovarianceStamped) -> Pose2D | None:
+    """Return where the robot was set down, or None if the message holds no pose on the ground."""
+    place, turn = message.pose.pose.position, message.pose.pose.orientation
+    values = (place.x, place.y, turn.x, turn.y, turn.z, turn.w)
+    if not all(math.isfinite(value) for value in values) or math.hypot(*values[2:]) < 0.5:
+        return None
+    return pose_on_ground(values[:2], values[2:])
 
 
 def quaternion(yaw: float) -> Quaternion:

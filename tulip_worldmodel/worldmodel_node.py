@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry as OdometryMessage
 
 from tulip_description.field import FieldError, load_field
@@ -18,6 +19,7 @@ from tulip_worldmodel.messages import (
     features_from_message,
     map_to_odom_message,
     robot_pose_to_message,
+    start_pose_from_message,
     world_state_to_message,
 )
 from tulip_worldmodel.rejected import Rejected
@@ -32,6 +34,7 @@ class WorldModelNodeParameters(WorldModelParameters):
     start_y: float = 0.0  # [m]
     start_yaw: float = 0.0  # [rad]
     field_file: str = ""  # "" for the AdultSize field of 2013
+    field_turned: bool = False  # the team attacks the goal at -x of the file, so its map is turned by half a circle
     publish_period: float = 0.02  # [s] between two world states without a new picture: one with news goes out at once
 
 
@@ -41,22 +44,24 @@ class WorldModelNode(ComponentNode):
     def __init__(self) -> None:
         """Make the core and connect it."""
         super().__init__("worldmodel")
-        self._settings = self.load(WorldModelNodeParameters())
+        p = self._settings = self.load(WorldModelNodeParameters())
+        self._start = Pose2D(p.start_x, p.start_y, p.start_yaw)
         self.begin_anew()
         self._world_state = self.sender(topics.WORLD_STATE)
         self._robot_pose = self.sender(topics.ROBOT_POSE)
         self._transforms = self.sender(topics.TF)
         self.listen(topics.ODOMETRY, self._on_odometry)
         self.listen(topics.FEATURES, self._on_features)
+        self.listen(topics.START_POSE, self._on_start_pose)
 
     def begin_anew(self) -> None:
-        """Make the core, which starts at the start pose."""
+        """Make the core, which starts where the robot was set down last."""
         p = self._settings
         try:
             field = load_field(p.field_file or None)
         except FieldError as error:
             raise BadInputError(f"Parameter field_file of node 'worldmodel': {error}") from error
-        self._world = WorldModel(p, field, Pose2D(p.start_x, p.start_y, p.start_yaw))
+        self._world = WorldModel(p, field.turned() if p.field_turned else field, self._start)
         self._last_published: int | None = None  # stamp [ns]
         self._newest: int | None = None  # stamp of the newest odometry [ns]
 
@@ -76,6 +81,14 @@ class WorldModelNode(ComponentNode):
             self.get_logger().debug(describe(entry))
         if self._newest is not None:
             self._publish(self._newest)
+
+    def _on_start_pose(self, message: PoseWithCovarianceStamped) -> None:
+        pose = start_pose_from_message(message)
+        if pose is None:
+            self.health.count("bad start poses", "initialpose holds no pose on the ground; expected finite numbers")
+            return
+        self._start = pose
+        self.begin_anew()
 
     def _publish(self, stamp: int) -> None:
         self._last_published = stamp

@@ -21,5 +21,5 @@ def test_a_part_that_differs_is_made_anew() -> None:
 
 
 def test_a_page_without_the_marks_is_refused() -> None:
-    with pytest.raises(ValueError, match="architecture.md holds 0 blocks <!-- graph -->"):
+    with pytest.raises(ValueError, match=r"architecture\.md holds 0 blocks <!-- graph -->"):
         docs.render("architecture.md", "nothing")

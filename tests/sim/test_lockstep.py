@@ -35,6 +35,8 @@ NOT_IN_LOCKSTEP = {
     topics.ROBOT_DESCRIPTION,
     topics.DIAGNOSTICS,
     topics.CLOCK,
+    topics.START_POSE,  # in matches alone
+    topics.REPORT,
 }
 
 
@@ -71,7 +73,7 @@ def _run(seed: int, eyes_beside: bool = False) -> Run:
         if topic == "features":
             delays.add(trial.stamp - stamp)
         if topic == "ground_truth":
-            value = value[0]  # type: ignore[index]  # without the referee, which is no value
+            value = value[0]  # type: ignore[index]  # without what the referee says
         told.append((topic, stamp, _bits(value)))
 
     scenario = make_scenario("trial", np.random.default_rng(seed), load_field())

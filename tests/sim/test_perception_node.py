@@ -40,7 +40,9 @@ def world() -> World:
 
 def test_truth_survives_the_way_through_a_message(world: World) -> None:
     truth = world.truth()
-    again = truth_from_message(truth_to_message(truth, Referee(RefereeParameters(), world.field)), truth.poles)
+    again = truth_from_message(
+        truth_to_message(truth, Referee(RefereeParameters(), world.field).verdict()), truth.poles
+    )
     assert again.stamp == truth.stamp
     for name in ("base_position", "base_orientation", "joint_positions", "ball_position"):
         assert np.array_equal(getattr(again, name), getattr(truth, name)), name
@@ -54,7 +56,7 @@ def test_node_turns_the_truth_into_features_with_the_pose_of_odometry(world: Wor
         topics.FEATURES.subscribe_from(node, found.append)
         bodies, heads = topics.ODOMETRY.publish_from(node), topics.JOINT_STATES.publish_from(node)
         truths = topics.GROUND_TRUTH.publish_from(node)
-        message = truth_to_message(truth, Referee(RefereeParameters(), world.field))
+        message = truth_to_message(truth, Referee(RefereeParameters(), world.field).verdict())
         begin = stamp_of(message)
         truths.publish(message)
         end = time.monotonic() + 10.0

@@ -1,0 +1,157 @@
+"""The simulator of a match: one world, two robots in their namespaces, a referee, and people round the field.
+
+The people speak to the robots as people do: through the services of each robot's node user_input, and by telling its
+world model where it was set down.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NoReturn
+
+from tulip_description.field import load_field
+from tulip_description.planar import Pose2D
+from tulip_description.robot import load_robot
+from tulip_msgs.srv import SetUserCommand
+from tulip_ros import topics
+from tulip_ros.run import run
+from tulip_sim.hands import Hands
+from tulip_sim.judging import Verdict
+from tulip_sim.lockstep_match import team_truth
+from tulip_sim.match_referee import MatchReferee
+from tulip_sim.match_rules import COLOUR_NAMES, TEAMS, MatchRules, Role
+from tulip_sim.match_settings import NAMESPACES, MatchSettings
+from tulip_sim.messages import report_to_message
+from tulip_sim.referee_link import hear_replies, open_referee
+from tulip_sim.scenario import Scenario
+from tulip_sim.simulator_node import SimulatorNode, SimulatorParameters, Spin
+from tulip_sim.truth import Truth
+from tulip_sim.world import World
+from tulip_strategy.game_controller import REFEREE_PORT
+from tulip_strategy.interface import UserRequest
+from tulip_worldmodel.messages import start_pose_to_message
+
+PATIENCE = 0.05  # [s] of one wait for a service's answer
+AGAIN = 5.0  # [s] of wall-clock time without an answer after which a wish is told again
+
+
+@dataclass(frozen=True)
+class MatchDriverNodeParameters(SimulatorParameters):
+    """How the simulator runs, and the rules of the match."""
+
+    second_referee_port: int = REFEREE_PORT + 2  # UDP, of the second robot's game input on the same machine
+    striker: str = MatchSettings.striker  # strategy that a striker is told to play
+    keeper: str = MatchSettings.keeper  # strategy that a goalkeeper is told to play
+    rules: MatchRules = field(default_factory=MatchRules)
+
+
+class MatchDriverNode(SimulatorNode):
+    """Owns the world of two robots."""
+
+    def __init__(self) -> None:
+        """Make the world and connect it."""
+        super().__init__("driver")
+        p = self._settings = self.load(MatchDriverNodeParameters())
+        self._report = self.sender(topics.REPORT)
+        self._referee_socket = None
+        if p.referee:
+            ports = p.referee_port, (p.second_referee_port,)
+            self._referee_socket = open_referee(p.referee_address, ports[0], p.rules.version, p.reply_port, ports[1])
+        cameras = [
+            replace(p.pictures, team_colour=COLOUR_NAMES[team], keeper_colour=COLOUR_NAMES[1 - team]) for team in TEAMS
+        ]
+        self.prepare(p, list(zip(NAMESPACES, cameras, strict=True)))
+        self._crews = [_Crew(self, namespace) for namespace in NAMESPACES]
+        playing_field = load_field()
+        self._referee = MatchReferee(p.rules, playing_field, p.seed)
+        (first, second), ball = self._referee.places
+        scenario = Scenario(first, ball, poles=bool(playing_field.poles), others=(second,))
+        self.begin_world(World(scenario, p.world, p.seed, playing_field, load_robot()), [[p.seed, 1], [p.seed, 2]])
+        self._hands = Hands(self.world, self)
+        self._said = 0
+
+    def judge(self, spin: Spin) -> Sequence[tuple[Truth, Verdict]]:
+        """Let people and referee do their part."""
+        self._hands.move()
+        packet = self._referee.update([self.world.truth(team) for team in TEAMS])
+        for order in self._referee.take_orders():
+            self._hands.take(order)
+        for crew in self._crews:
+            crew.speak(spin, self._settings.answer_bound)
+        if packet is not None and self._referee_socket is not None:
+            self._referee_socket.send(packet)
+            hear_replies(self._referee_socket, self.health)
+        if len(self._referee.report.log) != self._said:
+            self._said = len(self._referee.report.log)
+            self._report.publish(report_to_message(self._referee.report))
+        return [(team_truth(self.world, team), self._referee.verdict(team)) for team in TEAMS]
+
+    def make_limp(self, robot: int) -> None:
+        """Switch a robot's legs off."""
+        self._crews[robot].want(UserRequest.LIMP)
+
+    def let_stand(self, robot: int) -> None:
+        """Have a robot stand up straight."""
+        self._crews[robot].want(UserRequest.STAND)
+
+    def let_play(self, robot: int, role: Role) -> None:
+        """Let a robot play, and tell it as what."""
+        p = self._settings
+        self._crews[robot].want(UserRequest.PLAY, p.striker if role is Role.STRIKER else p.keeper)
+
+    def tell_place(self, robot: int, pose: Pose2D) -> None:
+        """Tell a robot where it stands, in its own map."""
+        self._crews[robot].tell_place(pose)
+
+
+class _Crew:
+    """A team's people at their robot."""
+
+    def __init__(self, node: MatchDriverNode, namespace: str) -> None:
+        self._node, self._namespace = node, namespace
+        self._place = node.sender(topics.START_POSE.within(namespace))
+        service = topics.SET_USER_COMMAND
+        self._service = node.create_client(service.type, f"{namespace}/{service.name}")
+        self._wishes: deque[SetUserCommand.Request] = deque()
+        self._answer: Any = None
+        self._asked = 0.0
+
+    def want(self, request: UserRequest, strategy: str = "") -> None:
+        """Note a wish; it is told as soon as the one before was answered."""
+        self._wishes.append(SetUserCommand.Request(request=request.value, strategy=strategy))
+
+    def tell_place(self, pose: Pose2D) -> None:
+        """Tell the robot where it stands, in its own map."""
+        self._place.publish(start_pose_to_message(pose, self._node.world.stamp))
+
+    def speak(self, spin: Spin, bound: float) -> None:
+        """Tell what there is to tell, and hold the time for the answers; no longer than `bound` [s] of wall clock."""
+        end = time.monotonic() + bound
+        while self._wishes:
+            now = time.monotonic()
+            if self._answer is None and self._service.service_is_ready():
+                self._answer, self._asked = self._service.call_async(self._wishes[0]), now
+            elif self._answer is not None and self._answer.done():
+                result = self._answer.result()
+                if not result.success:
+                    self._node.health.count("refused wishes", f"{self._namespace} refuses: {result.message}")
+                self._wishes.popleft()
+                self._answer = None
+                continue
+            elif self._answer is not None and now - self._asked > AGAIN:
+                self._answer = None  # the node was restarted meanwhile
+            if now > end:
+                return
+            spin(PATIENCE)
+
+
+def main() -> NoReturn:
+    """Run the simulator until SIGINT or SIGTERM."""
+    run(MatchDriverNode, MatchDriverNode.advance)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,304 @@
+"""What drivers in the simulator share: the contract with each robot's nodes, and time that waits for them.
+
+In `sync` mode a control tick passes only when the commands that answer the sensors of the tick before are
+in, so a slow or loaded machine runs slower, not worse. Physics and control work at the same time: while
+the world advances by one tick, motion control computes the answer that acts in the next.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import String
+
+from tulip_description.field import load_field
+from tulip_description.robot import load_robot
+from tulip_description.urdf import build_urdf
+from tulip_motion.messages import joint_command_from_message, sensors_to_messages
+from tulip_msgs.msg import FootForces
+from tulip_msgs.msg import JointCommand as JointCommandMessage
+from tulip_ros import topics
+from tulip_ros.run import ComponentNode
+from tulip_ros.time import stamp_of, to_message
+from tulip_sim.camera import CameraParameters, CameraRenderer
+from tulip_sim.judging import Verdict
+from tulip_sim.messages import jpeg_to_message, lens_to_message, truth_to_message
+from tulip_sim.parameters import WorldParameters
+from tulip_sim.timing import CAMERA_TICKS, SLOW_TICKS, TICK
+from tulip_sim.truth import Truth
+from tulip_sim.world import World
+from tulip_strategy.game_controller import REFEREE_PORT
+from tulip_vision.lens import head_camera_lens
+from tulip_vision.messages import picture_to_message
+
+LAG = 0.05  # [s] behind the wall clock after which the lost time is given up
+REPEAT = 0.1  # [s] of wall-clock time between repetitions of sensors that nobody answered
+MODES = ("sync", "free")
+
+Spin = Callable[[float], None]
+"""Waits up to so many seconds [s] for messages and handles them."""
+
+
+@dataclass(frozen=True)
+class SimulatorParameters:
+    """How a simulator runs."""
+
+    mode: str = "sync"  # "sync" waits for the answer to each tick's sensors; "free" follows the wall clock
+    speed: float = 1.0  # times real time at most; 0 for as fast as it can
+    seed: int = 0
+    camera: bool = True
+    referee: bool = True
+    referee_address: str = "127.0.0.1"
+    referee_port: int = REFEREE_PORT
+    reply_port: int = 0  # where the referee hears robots; 0 for the port that its packets' version has
+    answer_bound: float = 0.3  # [s] of wall-clock time to wait for an answer in sync mode
+    start_bound: float = 30.0  # [s] of wall-clock time to wait for the other nodes at the start
+    wait_for: tuple[str, ...] = ("motion",)  # nodes that must be in the graph before time begins
+    world: WorldParameters = field(default_factory=WorldParameters)
+    pictures: CameraParameters = field(default_factory=CameraParameters)
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            ValueError: if one is not usable.
+        """
+        if self.mode not in MODES:
+            raise ValueError(f"mode is {self.mode!r}; expected one of {', '.join(MODES)}")
+        if not 0 <= self.reply_port < 65536:
+            raise ValueError(f"reply_port is {self.reply_port}; expected 0 to 65535")
+        for name in ("speed", "answer_bound", "start_bound"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
+                raise ValueError(f"{name} is {getattr(self, name)}; expected a finite number >= 0")
+        if self.seed < 0:
+            raise ValueError(f"seed is {self.seed}; expected >= 0")
+
+
+class RobotPort:
+    """One robot's body on topics: joint commands in; sensors, pictures and truth out."""
+
+    def __init__(self, node: SimulatorNode, robot: int, namespace: str, camera: CameraParameters) -> None:
+        """Connect.
+
+        Args:
+            node: Owns the world.
+            robot: Number in the world.
+            namespace: Of the robot's topics, below the node's own; "" for none.
+            camera: How the robot's camera sees.
+        """
+        self._node, self._robot = node, robot
+        body, self._lens = load_robot(), head_camera_lens()
+        self._cells = np.array([foot.cells for foot in body.feet])
+        self._camera = CameraRenderer(camera, load_field(), body, self._lens)
+        outputs = (
+            topics.JOINT_STATES,
+            topics.IMU,
+            topics.FOOT_FORCES,
+            topics.CAMERA_IMAGE,
+            topics.CAMERA_COMPRESSED,
+            topics.GROUND_TRUTH,
+            topics.CAMERA_INFO,
+            topics.ROBOT_DESCRIPTION,
+        )
+        senders = [node.sender(topic.within(namespace)) for topic in outputs]
+        self._joints, self._imu, self._forces, self._pictures, self._compressed, self._truth = senders[:6]
+        self._lens_sender, self._description = senders[6:]
+        self._description.publish(String(data=build_urdf(body)))
+        node.listen(topics.LEG_COMMAND.within(namespace), self._on_legs)
+        node.listen(topics.HEAD_JOINT_COMMAND.within(namespace), self._on_head)
+
+    def begin_anew(self, seed: int | list[int]) -> None:
+        """Wait for the first command; the seed is that of the pictures' noise."""
+        self._rng = np.random.default_rng(seed)
+        self._asked: int | None = None  # stamp of the sensors whose answer is due
+        self._answer: JointCommandMessage | None = None
+        self._newest: tuple[JointState, Imu, FootForces] | None = None
+        self._lens_sender.publish(lens_to_message(self._lens, 0))
+
+    def measure(self) -> None:
+        """Read the sensors; their answer is due in the tick after this one."""
+        sensors = self._node.world.sensors(self._robot)
+        self._newest, self._newest_stamp = sensors_to_messages(sensors, self._cells), sensors.stamp
+
+    def send(self) -> None:
+        """Send what was measured, for the first time or again."""
+        if self._newest is not None:
+            joints, imu, forces = self._newest
+            self._joints.publish(joints)
+            self._imu.publish(imu)
+            self._forces.publish(forces)
+
+    @property
+    def answered(self) -> bool:
+        """Whether the answer to the sensors of the tick before is in, if there were any."""
+        if self._asked is None:
+            return True
+        return self._answer is not None and stamp_of(self._answer) >= self._asked
+
+    def obey(self) -> None:
+        """Give the answer to the joints, and ask for the next."""
+        if self._answer is not None:
+            self._apply(self._answer)
+            self._answer = None
+        self._asked = self._newest_stamp
+
+    def tell_truth(self, truth: Truth, verdict: Verdict) -> None:
+        """Publish what really is."""
+        self._truth.publish(truth_to_message(truth, verdict))
+
+    def take_picture(self) -> None:
+        """Publish what the camera sees."""
+        truth = self._node.world.truth(self._robot)
+        picture = self._camera.render(truth, self._rng)
+        self._pictures.publish(picture_to_message(picture, truth.stamp))
+        if self._compressed.get_subscription_count() > 0:
+            self._compressed.publish(jpeg_to_message(picture, truth.stamp))
+
+    def _is_from_before(self, message: JointCommandMessage) -> bool:
+        """Tell whether a command answers sensors that are still to come: it was on its way when time began anew."""
+        return stamp_of(message) > self._node.world.stamp
+
+    def _on_legs(self, message: JointCommandMessage) -> None:
+        if self._is_from_before(message):
+            return
+        self._answer = message
+        self._node.heard_legs()
+
+    def _on_head(self, message: JointCommandMessage) -> None:
+        if not self._is_from_before(message):
+            self._apply(message)
+
+    def _apply(self, message: JointCommandMessage) -> None:
+        reason = self._node.world.apply(joint_command_from_message(message), self._robot)
+        if reason:
+            self._node.health.count("refused joint commands", f"joint command refused: {reason}")
+
+
+class SimulatorNode(ComponentNode):
+    """Owns a world and its time. Who inherits makes the world, and judges."""
+
+    world: World
+
+    def prepare(self, settings: SimulatorParameters, robots: Sequence[tuple[str, CameraParameters]]) -> None:
+        """Connect robots.
+
+        Args:
+            settings: How to run.
+            robots: Namespace and camera of each, in the order of the world.
+        """
+        self._pace_settings = settings
+        self._clock_sender = self.sender(topics.CLOCK)
+        self._ports = [RobotPort(self, index, *robot) for index, robot in enumerate(robots)]
+
+    def begin_world(self, world: World, seeds: Sequence[int | list[int]]) -> None:
+        """Begin anew with a world, and with the seeds of each robot's pictures."""
+        self.world = world
+        for port, seed in zip(self._ports, seeds, strict=True):
+            port.begin_anew(seed)
+        self._tick = 0
+        self._waits = self._pace_settings.mode == "sync"
+        self._started = False
+        self._paced_from = (time.monotonic(), 0)
+
+    def judge(self, spin: Spin) -> Sequence[tuple[Truth, Verdict]]:
+        """Let the referee see what is; return the truth about each robot and what there is to say of it. To override.
+
+        Args:
+            spin: Waits for messages.
+        """
+        raise NotImplementedError
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether waiting for answers shall end, because another world was wished for. To override."""
+        return False
+
+    def advance(self, spin: Spin) -> None:
+        """Let one control tick pass.
+
+        Args:
+            spin: Waits up to so many seconds [s] for messages and handles them.
+        """
+        for port in self._ports:
+            port.measure()
+        if self._tick == 0:
+            self._await_nodes(spin)
+        for port in self._ports:
+            port.send()
+        spin(0.0)
+        if self._waits:
+            self._await_answers(spin)
+        for port in self._ports:
+            port.obey()
+        self.world.advance(TICK)
+        verdicts = self.judge(spin)
+        if self._tick % SLOW_TICKS == 0:
+            self._clock_sender.publish(Clock(clock=to_message(self.world.stamp)))
+            for port, (truth, verdict) in zip(self._ports, verdicts, strict=True):
+                port.tell_truth(truth, verdict)
+        if self._pace_settings.camera:
+            for index, port in enumerate(self._ports):
+                if (self._tick - index * CAMERA_TICKS // len(self._ports)) % CAMERA_TICKS == 0:
+                    port.take_picture()
+        self._tick += 1
+        self._pace(spin)
+
+    def heard_legs(self) -> None:
+        """Wait for answers again, if time went on without."""
+        if not self._waits and self._pace_settings.mode == "sync":
+            self._waits = True
+            self._paced_from = (time.monotonic(), self.world.stamp)
+
+    def _await_nodes(self, spin: Spin) -> None:
+        """Wait until the nodes of `wait_for` are in the graph, so that time begins with whole robots."""
+        p, own = self._pace_settings, self.get_namespace().rstrip("/")
+        begin = time.monotonic()
+        missing = {f"{own}/{name}" for name in p.wait_for}
+        while missing and time.monotonic() - begin < p.start_bound:
+            spin(REPEAT)
+            missing -= {f"{space.rstrip('/')}/{name}" for name, space in self.get_node_names_and_namespaces()}
+        if missing:
+            names = ", ".join(sorted(name.removeprefix(f"{own}/") for name in missing))
+            self.health.count("started without nodes", f"time begins without {names}")
+        self._paced_from = (time.monotonic(), self.world.stamp)
+
+    def _await_answers(self, spin: Spin) -> None:
+        """Wait for the answers to the sensors of the tick before; the newest ones are already out."""
+        p = self._pace_settings
+        begin = time.monotonic()
+        bound = p.answer_bound if self._started else p.start_bound
+        repeat = begin + REPEAT
+        while not self.interrupted and not all(port.answered for port in self._ports):
+            now = time.monotonic()
+            if now - begin > bound:
+                # From here on time follows the wall clock, as it would on the robot, until answers come again.
+                self.health.count("ticks without an answer", "no leg command comes: the simulation goes on without")
+                self._waits = False
+                return
+            if now > repeat:
+                # Motion control may have been restarted: what it missed would never be answered.
+                for port in self._ports:
+                    port.send()
+                repeat = now + REPEAT
+            spin(min(REPEAT, bound))
+        self._started = self._started or self._tick > 0
+
+    def _pace(self, spin: Spin) -> None:
+        """Keep to the wall clock: never faster than `speed`, and without catching up when it was slower."""
+        speed = self._pace_settings.speed if self._waits else 1.0
+        if speed == 0.0:
+            return
+        wall, stamp = self._paced_from
+        due = wall + (self.world.stamp - stamp) * 1e-9 / speed
+        ahead = due - time.monotonic()
+        if ahead < -LAG:
+            self._paced_from = (time.monotonic(), self.world.stamp)
+        while ahead > 0.0:
+            spin(ahead)
+            ahead = due - time.monotonic()
