@@ -33,6 +33,12 @@ class StrategyParameters(GazeParameters):
     face_travel_distance: float = 0.8  # [m] with more left to go it faces its way, since forward is the fastest
     opponent_clearance: float = 0.7  # [m] half a keeper (0.25), the own half width (0.3), a margin
 
+    # Other robots.
+    keep_off: float = 0.6  # [m] between the middles of two robots, at which none walks towards the other any more
+    keep_off_gain: float = 0.8  # [1/s] speed towards another per distance that is left
+    kick_clear_distance: float = 0.72  # [m] nobody nearer in a kick's direction: the toe swings 0.5 m ahead
+    kick_clear_angle: float = math.radians(50.0)  # [rad] to either side
+
     # Standing behind the ball: begin inside the first, end outside the second of each pair.
     behind_offset: float = 0.12  # [m] sideways, on the ball
     behind_offset_end: float = 0.25  # [m]

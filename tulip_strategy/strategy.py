@@ -9,6 +9,7 @@ from py_trees.behaviour import Behaviour
 from tulip_description.field import Field
 from tulip_motion.interface import HeadCommand, HeadMode, MotionState, WalkCommand, WalkMode
 from tulip_strategy.behaviour.context import Context
+from tulip_strategy.behaviour.keep_off import kept_off
 from tulip_strategy.behaviour.steering import STILL, Acceleration
 from tulip_strategy.behaviour.tree import build_tree
 from tulip_strategy.interface import Decision, GamePhase, GameState, UserCommand
@@ -67,7 +68,7 @@ class Strategy:
             self._acceleration.reset()
             return WalkCommand(context.stamp, context.mode, STILL)
         velocity = self._acceleration.step(context.velocity, math.inf if context.sudden else context.dt)
-        return WalkCommand(context.stamp, WalkMode.WALK, velocity)
+        return WalkCommand(context.stamp, WalkMode.WALK, kept_off(velocity, context.bodies, context.parameters))
 
     def _head(self) -> HeadCommand:
         context = self._context

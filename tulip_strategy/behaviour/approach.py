@@ -71,8 +71,7 @@ class Approach(Leaf):
     def _round_opponents(self, waypoint: Point) -> Point:
         """Return a waypoint beside the nearest opponent that stands in the way, else the waypoint itself."""
         clearance = self.context.parameters.opponent_clearance
-        opponents = [(float(each.position[0]), float(each.position[1])) for each in self.context.opponents]
-        for opponent in sorted(opponents, key=lambda point: math.hypot(*point)):
+        for opponent in sorted(self.context.bodies, key=lambda point: math.hypot(*point)):
             at_target = math.dist(opponent, waypoint) < clearance
             if not at_target and distance_to_way(opponent, (0.0, 0.0), waypoint) < clearance:
                 side = side_round(waypoint, opponent, 0)

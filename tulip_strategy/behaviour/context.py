@@ -104,6 +104,11 @@ class Context:
             if all(abs(at) < most for at, most in zip(each.position_in_map, reach, strict=True))
         )
 
+    @property
+    def bodies(self) -> list[Point]:
+        """Where opponents stand, in base_footprint [m]."""
+        return [(float(each.position[0]), float(each.position[1])) for each in self.opponents]
+
     def clear_wish(self) -> None:
         """Forget the last wish: stand and hold the head."""
         self.mode = WalkMode.STAND

@@ -118,7 +118,7 @@ class NearBall(Leaf):
         if abs(x - goal.x) > parameters.keeper_clear_depth + more or abs(y) > 0.5 * goal.width + 1.0 + more:
             return False
         own = math.hypot(*ball.position)
-        others = [math.dist(ball.position, tuple(each.position)) for each in context.opponents]
+        others = [math.dist(ball.position, each) for each in context.bodies]
         return all(own < other + more for other in others)
 
 
@@ -192,7 +192,7 @@ class Outwards:
         # A ball at the feet is kicked where the robot faces, one far away where the way to it leads.
         far = max(0.0, min(1.0, (math.hypot(*ball) - NEAR) / NEAR))
         present = pose.yaw + far * math.atan2(ball[1], ball[0])
-        opponents = [pose.transform((float(each.position[0]), float(each.position[1]))) for each in context.opponents]
+        opponents = [pose.transform(each) for each in context.bodies]
         at = [math.atan2(oy - y, ox - x) for ox, oy in opponents]
 
         def cost(direction: float) -> float:

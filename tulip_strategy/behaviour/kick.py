@@ -11,6 +11,7 @@ from tulip_motion.interface import KickGoal, MotionMode, Side
 from tulip_strategy.behaviour.base import Leaf
 from tulip_strategy.behaviour.context import Context
 from tulip_strategy.behaviour.gaze import look_at_ball, track_ball
+from tulip_strategy.behaviour.keep_off import in_kicks_way
 from tulip_strategy.behaviour.steering import from_aim_frame, in_aim_frame, limited
 
 
@@ -142,7 +143,7 @@ class Strike(Leaf):
         self._foot = foot
 
     def update(self) -> Status:
-        """Ask."""
+        """Ask, unless somebody stands in the way of the leg."""
         context, parameters = self.context, self.context.parameters
         ball, limit = context.ball.position, parameters.kick_direction_limit
         outward = 1.0 if self._foot.side is Side.LEFT else -1.0
@@ -151,6 +152,8 @@ class Strike(Leaf):
             # The nearer the ball lies to the other foot, the less the run-up may come from there.
             room += parameters.kick_outward_slope * (outward * ball[1] - parameters.kick_lateral)
         direction = outward * max(-limit, min(limit, room, outward * context.aim.direction))
+        if in_kicks_way(direction, context.bodies, parameters):
+            return Status.FAILURE
         ask_for_kick(context, KickGoal(self._foot.side, direction, context.aim.speed, ball=ball))
         return Status.SUCCESS
 
