@@ -63,7 +63,7 @@ def main(
     ] = 1,
     trials: Annotated[int, typer.Option(help="Of a match, in turns.", min=1)] = MatchRules.trials,
     playing_time: Annotated[float, typer.Option(help="Of each trial of a match [s].")] = MatchRules.playing_time,
-    striker: Annotated[str, typer.Option(help="Strategy of a match's striker.")] = MatchSettings.striker,
+    striker: Annotated[str, typer.Option(help="Strategy of the robot; of a match's striker.")] = MatchSettings.striker,
     keeper: Annotated[str, typer.Option(help="Strategy of a match's goalkeeper.")] = MatchSettings.keeper,
 ) -> None:
     """Play one trial, or a match of two robots.
@@ -77,6 +77,9 @@ def main(
             raise BadInputError(f"--mode is {mode!r}; expected one of {', '.join(MODES)}.")
         if scenario not in SCENARIOS:
             raise unknown("scenario", scenario, SCENARIOS)
+        for option, name in (("--striker", striker), ("--keeper", keeper)):
+            if name not in STRATEGIES:
+                raise BadInputError(f"{option} is {name!r}; expected one of {', '.join(STRATEGIES)}.")
         if eyes not in EYES:
             raise BadInputError(f"--eyes is {eyes!r}; expected one of {', '.join(EYES)}.")
         if mode != "graph" and (parameters or logs):
@@ -118,11 +121,12 @@ def main(
                     referee_port=referee_port,
                     logs=logs,
                     perception=EYES[eyes],
+                    strategy=striker,
                 )
             else:
                 beside = (os.cpu_count() or 1) > 1 and EYES[eyes] is None
                 settings = Settings(perception=EYES[eyes])
-                summary = play_lockstep(seed, scenario, settings, folder, show, eyes_beside=beside)
+                summary = play_lockstep(seed, scenario, settings, folder, show, beside, striker)
     except BadInputError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from None
@@ -150,9 +154,6 @@ def match_settings(
     Raises:
         BadInputError: if they make no match.
     """
-    for name, strategy in (("--striker", striker), ("--keeper", keeper)):
-        if strategy not in STRATEGIES:
-            raise BadInputError(f"{name} is {strategy!r}; expected one of {', '.join(STRATEGIES)}.")
     try:
         rules = MatchRules(trials=trials, playing_time=playing_time)
     except ValueError as error:

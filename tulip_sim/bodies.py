@@ -19,7 +19,6 @@ from tulip_description.keeper import KeeperPart, keeper_parts
 from tulip_description.planar import Pose2D
 from tulip_description.robot import Box, Robot, realizable_inertia
 from tulip_description.urdf import build_urdf
-from tulip_sim.keeper import Keeper
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.physics import pybullet
 
@@ -130,16 +129,16 @@ def add_ball(client: int, radius: float, carpet_friction: float, parameters: Wor
     return body
 
 
-def add_keeper(client: int, keeper: Keeper) -> int:
-    """Add the keeper's figure. It has no mass, so nothing pushes it away; `move_keeper` moves it."""
+def add_figure(client: int, pose: Pose2D) -> int:
+    """Add a figure like the keeper's. It has no mass, so nothing pushes it away; `move_figure` moves it."""
     shape = _boxes(client, [part for part in keeper_parts() if part.solid])
     body = _static(client, shape, friction=0.5)
-    move_keeper(client, body, keeper.pose)
+    move_figure(client, body, pose)
     return body
 
 
-def move_keeper(client: int, body: int, pose: Pose2D) -> None:
-    """Put the keeper at a pose in map."""
+def move_figure(client: int, body: int, pose: Pose2D) -> None:
+    """Put a figure at a pose in map."""
     turn = [0.0, 0.0, math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)]
     pybullet.resetBasePositionAndOrientation(body, [pose.x, pose.y, 0.0], turn, physicsClientId=client)
 

@@ -23,7 +23,12 @@ from tulip_ros import topics
 from tulip_ros.bag import Bag
 from tulip_ros.topics import Topic
 from tulip_sim.messages import jpeg_to_message, report_to_message, truth_to_message
-from tulip_strategy.messages import decision_to_message, game_state_to_message, user_command_to_message
+from tulip_strategy.messages import (
+    decision_to_message,
+    game_state_to_message,
+    tree_to_message,
+    user_command_to_message,
+)
 from tulip_vision.messages import features_to_message
 from tulip_worldmodel.messages import (
     map_to_odom_message,
@@ -76,6 +81,7 @@ class LockstepRecording:
             "walk_command": lambda stamp, value: [(topics.WALK_COMMAND, walk_command_to_message(value))],
             "head_command": lambda stamp, value: [(topics.HEAD_COMMAND, head_command_to_message(value))],
             "decision": lambda stamp, value: [(topics.DECISION, decision_to_message(value))],
+            "behaviour_tree": lambda stamp, value: [(topics.BEHAVIOUR_TREE, tree_to_message(value))],
             "ground_truth": lambda stamp, value: [(topics.GROUND_TRUTH, truth_to_message(*value))],
             "initialpose": lambda stamp, value: [(topics.START_POSE, start_pose_to_message(value, stamp))],
             "referee/report": lambda stamp, value: [(topics.REPORT, report_to_message(value))],

@@ -89,6 +89,7 @@ def trial_plan(
     values: Mapping[str, Mapping[str, Any]] | None = None,
     referee_port: int = REFEREE_PORT,
     perception: PerceptionParameters | None = None,
+    strategy: str = "dribble_and_kick",
 ) -> tuple[Start, ...]:
     """Return the nodes of a trial: simulator, robot, and recorder if wanted. Arguments as for `play_graph`.
 
@@ -105,7 +106,7 @@ def trial_plan(
         # The team tells its robot where it was put down, as people do on the real field.
         "worldmodel": {"start_x": start.x, "start_y": start.y, "start_yaw": start.yaw},
         "game_input": {"port": referee_port},
-        "user_input": {"autostart": True},
+        "user_input": {"autostart": True, "strategy": strategy},
     }
     nodes = list(NODES)
     if perception is not None:
@@ -137,6 +138,7 @@ def play_graph(
     referee_port: int = REFEREE_PORT,
     logs: Path | None = None,
     perception: PerceptionParameters | None = None,
+    strategy: str = "dribble_and_kick",
 ) -> TrialSummary:
     """Play one trial.
 
@@ -151,11 +153,12 @@ def play_graph(
         referee_port: UDP port between referee and game input.
         logs: Folder for one log file a node.
         perception: How good node perception is, which then stands in for vision; None for camera and vision.
+        strategy: Name of what the robot plays.
 
     Raises:
         BadInputError: if a node refuses what it was given, or the simulator falls silent.
     """
-    plan = trial_plan(seed, scenario, record, parameter_files, values, referee_port, perception)
+    plan = trial_plan(seed, scenario, record, parameter_files, values, referee_port, perception, strategy)
     with (
         Launcher(plan, logs) as launcher,
         session(TrialWatcher, arguments=[], handle_signals=False) as (watcher, spin),

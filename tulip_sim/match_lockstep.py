@@ -13,6 +13,7 @@ from tulip_sim.lockstep import Lockstep, Settings
 from tulip_sim.lockstep_recording import LockstepRecording
 from tulip_sim.scenario import make_scenario
 from tulip_sim.trial import NO_CAMERA, TrialObserver, TrialSummary
+from tulip_strategy.interface import UserRequest
 
 Progress = Callable[[float, str], None]
 """Is told simulated time [s] and what the robot is doing."""
@@ -25,6 +26,7 @@ def play_lockstep(
     record: Path | None = None,
     progress: Progress | None = None,
     eyes_beside: bool = False,
+    strategy: str = "dribble_and_kick",
 ) -> TrialSummary:
     """Play one trial.
 
@@ -35,6 +37,7 @@ def play_lockstep(
         record: New folder for the recording, or None for none.
         progress: Told once in a simulated second.
         eyes_beside: Let camera and vision work in a process of their own.
+        strategy: Name of what the robot plays.
 
     Raises:
         BadInputError: if the recording cannot be written.
@@ -50,6 +53,8 @@ def play_lockstep(
     try:
         start = make_scenario(scenario, np.random.default_rng(seed), load_field())
         trial = Lockstep(start, seed, settings, listen, eyes_beside)
+        if strategy != trial.user.strategy:
+            trial.ask(UserRequest.PLAY, strategy)
         begin = time.monotonic()
 
         def watch(now: Lockstep) -> None:

@@ -73,10 +73,8 @@ def truth_to_message(truth: Truth, verdict: Verdict) -> GroundTruth:
         trial_time=verdict.played,
     )
     if keeper is not None:
-        half = keeper.yaw / 2.0
-        message.keeper = _pose(
-            np.array([keeper.x, keeper.y, 0.0]), np.array([0.0, 0.0, math.sin(half), math.cos(half)])
-        )
+        message.keeper = _standing(keeper)
+    message.obstacles = [_standing(each) for each in truth.obstacles]
     return message
 
 
@@ -87,10 +85,7 @@ def truth_from_message(message: GroundTruth, poles: bool) -> Truth:
         message: From `truth_to_message`.
         poles: Whether the landmark poles stand.
     """
-    keeper = None
-    if message.keeper_present:
-        turn = message.keeper.orientation
-        keeper = Pose2D(message.keeper.position.x, message.keeper.position.y, 2.0 * math.atan2(turn.z, turn.w))
+    keeper = _on_ground(message.keeper) if message.keeper_present else None
     return Truth(
         stamp=stamp_of(message),
         base_position=_vector(message.robot.position),
@@ -109,6 +104,7 @@ def truth_from_message(message: GroundTruth, poles: bool) -> Truth:
         body_touches=0,
         keeper_touches=0,
         poles=poles,
+        obstacles=tuple(_on_ground(each) for each in message.obstacles),
     )
 
 
@@ -126,6 +122,17 @@ def _pose(position: Array, orientation: Array) -> Pose:
     turn = pose.orientation
     turn.x, turn.y, turn.z, turn.w = orientation.tolist()
     return pose
+
+
+def _standing(place: Pose2D) -> Pose:
+    """Return a pose on the ground as a message."""
+    half = place.yaw / 2.0
+    return _pose(np.array([place.x, place.y, 0.0]), np.array([0.0, 0.0, math.sin(half), math.cos(half)]))
+
+
+def _on_ground(pose: Pose) -> Pose2D:
+    """Return where on the ground a pose of a message stands."""
+    return Pose2D(pose.position.x, pose.position.y, 2.0 * math.atan2(pose.orientation.z, pose.orientation.w))
 
 
 def _twist(linear: Array, angular: Array) -> Twist:

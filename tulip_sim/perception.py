@@ -304,9 +304,7 @@ class Perception:
             yield Glimpse(FeatureClass.GOAL, np.concatenate(feet))
 
     def _opponents(self, scene: _Scene) -> Iterator[Glimpse]:
-        keeper = scene.truth.keeper
-        standing = [] if keeper is None else [keeper]
-        for place in (*standing, *(other.footprint for other in scene.truth.others)):
+        for place in (*scene.truth.figures, *(other.footprint for other in scene.truth.others)):
             facing = scene.eye[:2] - (place.x, place.y)
             front = np.array([place.x, place.y]) + 0.12 * facing / max(float(np.linalg.norm(facing)), 1e-6)
             points = np.array([[*front, 0.0], [*front, CHEST]])

@@ -32,6 +32,7 @@ from tulip_strategy.game_input import GameInput, GameInputParameters
 from tulip_strategy.interface import Decision, GameState, UserCommand, UserRequest
 from tulip_strategy.parameters import StrategyParameters
 from tulip_strategy.strategy import Strategy
+from tulip_strategy.tree_state import NodeStatus
 from tulip_vision.features import Features
 from tulip_vision.pipeline import VisionParameters
 from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParameters
@@ -110,6 +111,7 @@ class RobotStack:
         self._looking = False
         self._seen: deque[tuple[Picture | None, Features]] = deque()  # not used before their time
         self._tick = 0
+        self._told_tree: tuple[NodeStatus, ...] = ()
         self.doing = ""
         """Active path of the behaviour tree."""
         self._tell("user_command", 0, self.user)
@@ -216,3 +218,6 @@ class RobotStack:
         self._tell("walk_command", stamp, decision.walk)
         self._tell("head_command", stamp, decision.head)
         self._tell("decision", stamp, decision)
+        if self.strategy.tree.statuses != self._told_tree:
+            self._told_tree = self.strategy.tree.statuses
+            self._tell("behaviour_tree", stamp, self.strategy.tree)

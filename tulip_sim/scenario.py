@@ -22,6 +22,7 @@ class Scenario:
         ball: x, y of the ball on the ground [m].
         keeper: The opponent's goalkeeper, or None.
         poles: Whether the field's landmark poles stand.
+        obstacles: Where figures like the keeper's stand for the robot to go round, in map.
         others: Poses of further robots, each with a body of its own.
     """
 
@@ -29,6 +30,7 @@ class Scenario:
     ball: tuple[float, float]
     keeper: Keeper | None = None
     poles: bool = True
+    obstacles: tuple[Pose2D, ...] = ()
     others: tuple[Pose2D, ...] = ()
 
     def __post_init__(self) -> None:
@@ -46,6 +48,8 @@ class Scenario:
 BALL_DISTANCE = (0.5, 3.0)  # [m] from the robot
 HEADING_SPREAD = math.radians(45.0)  # to either side of the direction to the goal
 LINE_MARGIN = 0.3  # [m] the ball starts this far inside the outer lines at least
+THROW_IN_INSIDE = 0.1  # [m] of the touchline, where the ball is set down
+COURSE = (-1.0, 0.8, 2.6)  # [m] x of the obstacles in map
 KEEPER_AHEAD = 0.3  # [m] in front of the goal line
 KEEPER_HALF_WIDTH = 0.3  # [m] of the figure
 KEEPER_OFF_CENTRE = (0.25, 0.75)  # [m] to either side
@@ -84,10 +88,28 @@ def open_play(rng: np.random.Generator, field: Field) -> Scenario:
     return Scenario(Pose2D(-2.0, 0.0, 0.0), (-1.0, 0.0), poles=bool(field.poles))
 
 
+def throw_in(rng: np.random.Generator, field: Field) -> Scenario:
+    """Return the technical challenge: the ball beside a touchline, the robot somewhere in the field, nobody else."""
+    side = 1.0 if rng.random() < 0.5 else -1.0
+    ball = (rng.uniform(-2.0, 2.0), side * (0.5 * field.width - THROW_IN_INSIDE))
+    robot = Pose2D(ball[0] + rng.uniform(-1.5, 1.5), side * rng.uniform(0.0, 1.0), side * math.pi / 2.0)
+    return Scenario(robot, ball, poles=bool(field.poles))
+
+
+def dribble_course(rng: np.random.Generator, field: Field) -> Scenario:
+    """Return the technical challenge: three obstacles, one after the other, between the ball and the goal."""
+    obstacles = []
+    for x in COURSE:
+        obstacles.append(Pose2D(x, rng.uniform(-0.8, 0.8), math.pi))
+    return Scenario(Pose2D(-3.4, 0.0, 0.0), (-2.6, 0.0), poles=bool(field.poles), obstacles=tuple(obstacles))
+
+
 SCENARIOS: dict[str, Callable[[np.random.Generator, Field], Scenario]] = {
     "trial": random_trial,
     "trial_moving_keeper": trial_against_moving_keeper,
     "open": open_play,
+    "throw_in": throw_in,
+    "dribble_course": dribble_course,
 }
 """Scenarios by name."""
 

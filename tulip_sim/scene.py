@@ -294,7 +294,7 @@ def scene_of(truth: Truth, body: Body, keeper_colour: str) -> tuple[Scene, dict[
         )
         boxes = boxes + figure.boxes(other_links)
         shadows += [(x, y, FOOT_SHADOW) for x, y in figure.feet(other_links)]
-    if truth.keeper is not None:
-        boxes = boxes + keeper_boxes(truth.keeper, keeper_colour)
-        shadows.append((truth.keeper.x, truth.keeper.y, KEEPER_SHADOW))
+    for place in truth.figures:
+        boxes = boxes + keeper_boxes(place, keeper_colour)
+        shadows.append((place.x, place.y, KEEPER_SHADOW))
     return Scene(truth.ball_position, boxes, truth.poles, tuple(shadows)), links

@@ -62,6 +62,7 @@ class Truth:
         keeper_touches: How often the keeper has met the ball.
         poles: Whether the landmark poles stand.
         others: The other robots.
+        obstacles: Where further figures stand.
     """
 
     stamp: int
@@ -82,6 +83,12 @@ class Truth:
     keeper_touches: int
     poles: bool
     others: tuple[OtherRobot, ...] = ()
+    obstacles: tuple[Pose2D, ...] = ()
+
+    @property
+    def figures(self) -> tuple[Pose2D, ...]:
+        """Where figures stand: the keeper, if there is one, and the obstacles."""
+        return self.obstacles if self.keeper is None else (self.keeper, *self.obstacles)
 
     @property
     def footprint(self) -> Pose2D:
@@ -90,7 +97,6 @@ class Truth:
 
     def turned(self) -> Truth:
         """Return the same in the map of the team that attacks the other goal: turned by half a circle."""
-        keeper = self.keeper
         return replace(
             self,
             base_position=HALF_TURN * self.base_position,
@@ -101,10 +107,15 @@ class Truth:
             ball_orientation=_turned(self.ball_orientation),
             ball_linear_velocity=HALF_TURN * self.ball_linear_velocity,
             ball_angular_velocity=HALF_TURN * self.ball_angular_velocity,
-            keeper=None if keeper is None else Pose2D(-keeper.x, -keeper.y, keeper.yaw + math.pi),
+            keeper=None if self.keeper is None else _turned_pose(self.keeper),
             keeper_path=tuple((-x, -y) for x, y in self.keeper_path),
             others=tuple(other.turned() for other in self.others),
+            obstacles=tuple(_turned_pose(each) for each in self.obstacles),
         )
+
+
+def _turned_pose(pose: Pose2D) -> Pose2D:
+    return Pose2D(-pose.x, -pose.y, pose.yaw + math.pi)
 
 
 def _turned(orientation: Array) -> Array:

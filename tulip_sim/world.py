@@ -72,7 +72,9 @@ class World:
         if scenario.poles:
             bodies.add_poles(self._client, self.field)
         self._ball = bodies.add_ball(self._client, self.field.ball_radius, self.friction, p)
-        self._keeper = None if scenario.keeper is None else bodies.add_keeper(self._client, scenario.keeper)
+        self._keeper = None if scenario.keeper is None else bodies.add_figure(self._client, scenario.keeper.pose)
+        for place in scenario.obstacles:
+            bodies.add_figure(self._client, place)
         self._keeper_pose = None if scenario.keeper is None else scenario.keeper.pose
         self._keeper_touches = TouchCounter()
         robots = []
@@ -155,6 +157,7 @@ class World:
             keeper_touches=self._keeper_touches.count,
             poles=self.scenario.poles,
             others=tuple(others),
+            obstacles=self.scenario.obstacles,
         )
 
     def push(self, force: ArrayLike, milliseconds: int, robot: int = 0) -> None:
@@ -217,7 +220,7 @@ class World:
             position, _ = pybullet.getBasePositionAndOrientation(self._ball, physicsClientId=self._client)
             pose = keeper.after(pose, position[1], 1e-3)
         self._keeper_pose = pose
-        bodies.move_keeper(self._client, self._keeper, pose)
+        bodies.move_figure(self._client, self._keeper, pose)
 
     def _count_touches(self) -> None:
         """Count who has come to touch the ball in this step."""
