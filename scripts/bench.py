@@ -28,6 +28,7 @@ from tulip_sim.bench import (
     kick,
     latency,
     localization,
+    match,
     odometry,
     push,
     stress,
@@ -37,7 +38,10 @@ from tulip_sim.bench import (
 )
 from tulip_sim.bench.runner import Row, run, save, write_results
 
-MODULES = (trial, walk, push, kick, odometry, control, ilc, clik, stress, vision, localization, ball, head, latency)
+MODULES = (
+    *(trial, match, walk, push, kick, odometry, control, ilc, clik, stress),
+    *(vision, localization, ball, head, latency),
+)
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"
 
