@@ -21,8 +21,7 @@ from tulip_ros.run import ComponentNode, session
 from tulip_ros.time import stamp_of
 from tulip_sim.match_graph import ENDING, LOOK, NODES, SILENCE, UNRECORDED
 from tulip_sim.match_report import MatchReport
-from tulip_sim.match_rules import COLOUR_NAMES, COLOURS, TEAMS, MatchRules
-from tulip_sim.match_settings import NAMESPACES, MatchSettings
+from tulip_sim.match_rules import COLOUR_NAMES, COLOURS, NAMESPACES, STRATEGY_OF, TEAMS, MatchRules, Role
 from tulip_sim.match_summary import MatchSummary
 from tulip_sim.messages import report_from_message
 from tulip_sim.trial import TrialObserver
@@ -95,8 +94,8 @@ def match_plan(
     parameter_files: Sequence[Path] = (),
     values: Values | None = None,
     referee_ports: tuple[int, int] = (REFEREE_PORT, REFEREE_PORT + 2),
-    striker: str = MatchSettings.striker,
-    keeper: str = MatchSettings.keeper,
+    striker: str = STRATEGY_OF[Role.STRIKER],
+    keeper: str = STRATEGY_OF[Role.KEEPER],
 ) -> tuple[Start, ...]:
     """Return the nodes of a match: one simulator, two robots, and a recorder if wanted.
 
