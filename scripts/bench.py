@@ -29,6 +29,7 @@ from tulip_sim.bench import (
     kick,
     latency,
     localization,
+    match,
     odometry,
     push,
     referee,
@@ -40,22 +41,8 @@ from tulip_sim.bench import (
 from tulip_sim.bench.runner import Row, run, save, write_results
 
 MODULES = (
-    strategy,
-    walk,
-    push,
-    kick,
-    odometry,
-    control,
-    ilc,
-    clik,
-    stress,
-    vision,
-    localization,
-    ball,
-    head,
-    latency,
-    referee,
-    batch,
+    *(strategy, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress),
+    *(vision, localization, ball, head, latency),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"

@@ -62,7 +62,7 @@ def main(
         int, typer.Option(help="1 for a trial against a figure, 2 for a match of two robots.", min=1, max=2)
     ] = 1,
     trials: Annotated[int, typer.Option(help="Of a match, in turns.", min=1)] = MatchRules.trials,
-    playing_time: Annotated[float, typer.Option(help="Of each trial of a match [s].")] = MatchRules.playing_time,
+    playing_time: Annotated[float, typer.Option(help="Seconds of each trial of a match.")] = MatchRules.playing_time,
     striker: Annotated[str, typer.Option(help="Strategy of the robot; of a match's striker.")] = MatchSettings.striker,
     keeper: Annotated[str, typer.Option(help="Strategy of a match's goalkeeper.")] = MatchSettings.keeper,
 ) -> None:

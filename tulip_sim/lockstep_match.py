@@ -12,7 +12,7 @@ from tulip_description.field import load_field
 from tulip_description.planar import Pose2D
 from tulip_description.robot import load_robot
 from tulip_sim.hands import Hands
-from tulip_sim.match_places import in_map_of
+from tulip_sim.match_places import in_map_of, team_truth
 from tulip_sim.match_referee import MatchReferee
 from tulip_sim.match_report import MatchReport
 from tulip_sim.match_rules import TEAMS, Role
@@ -20,7 +20,6 @@ from tulip_sim.match_settings import MatchSettings
 from tulip_sim.robot_stack import RobotStack
 from tulip_sim.scenario import Scenario
 from tulip_sim.timing import CAMERA_TICKS, TICK
-from tulip_sim.truth import Truth
 from tulip_sim.world import World
 from tulip_strategy.interface import UserRequest
 
@@ -137,9 +136,3 @@ class LockstepMatch:
     def tell_place(self, robot: int, pose: Pose2D) -> None:
         """Tell a robot where it stands, in its own map."""
         self.robots[robot].told_to_stand_at(pose)
-
-
-def team_truth(world: World, team: int) -> Truth:
-    """Return what really is about a team's robot, in the team's own map."""
-    truth = world.truth(team)
-    return truth if team == 0 else truth.turned()

@@ -20,10 +20,9 @@ from tulip_ros import topics
 from tulip_ros.run import run
 from tulip_sim.hands import Hands
 from tulip_sim.judging import Verdict
-from tulip_sim.lockstep_match import team_truth
+from tulip_sim.match_places import team_truth
 from tulip_sim.match_referee import MatchReferee
-from tulip_sim.match_rules import COLOUR_NAMES, TEAMS, MatchRules, Role
-from tulip_sim.match_settings import NAMESPACES, MatchSettings
+from tulip_sim.match_rules import COLOUR_NAMES, NAMESPACES, STRATEGY_OF, TEAMS, MatchRules, Role
 from tulip_sim.messages import report_to_message
 from tulip_sim.referee_link import hear_replies, open_referee
 from tulip_sim.scenario import Scenario
@@ -43,8 +42,8 @@ class MatchDriverNodeParameters(SimulatorParameters):
     """How the simulator runs, and the rules of the match."""
 
     second_referee_port: int = REFEREE_PORT + 2  # UDP, of the second robot's game input on the same machine
-    striker: str = MatchSettings.striker  # strategy that a striker is told to play
-    keeper: str = MatchSettings.keeper  # strategy that a goalkeeper is told to play
+    striker: str = STRATEGY_OF[Role.STRIKER]  # strategy that a striker is told to play
+    keeper: str = STRATEGY_OF[Role.KEEPER]  # strategy that a goalkeeper is told to play
     rules: MatchRules = field(default_factory=MatchRules)
 
 

@@ -117,14 +117,28 @@ def trial_plan(
         nodes.append("recorder")
         given["recorder"] = {"path": str(record.absolute()), "exclude": list(UNRECORDED)}
         given["driver"]["wait_for"] = list(nodes)
+    refuse_taken(parameter_files, given, "trial")
+    for name, own in (values or {}).items():
+        given.setdefault(name, {}).update(own)
+    return make_plan(nodes, "sim", parameter_files=parameter_files, values=given)
+
+
+def refuse_taken(parameter_files: Sequence[Path], given: Mapping[str, Mapping[str, Any]], what: str) -> None:
+    """Refuse files that set what is set already.
+
+    Args:
+        parameter_files: YAML files for the nodes.
+        given: What is set, by node name.
+        what: Who sets it, as in "trial".
+
+    Raises:
+        BadInputError: with the first name that both set, or if a file cannot be used.
+    """
     for path in parameter_files:
         for name, block in read_parameters(path).items():
             taken = sorted({str(key) for key in block} & given.get(name, {}).keys())
             if taken:
-                raise BadInputError(f"Parameter file {path} sets {name}.{taken[0]}, which the trial itself sets.")
-    for name, own in (values or {}).items():
-        given.setdefault(name, {}).update(own)
-    return make_plan(nodes, "sim", parameter_files=parameter_files, values=given)
+                raise BadInputError(f"Parameter file {path} sets {name}.{taken[0]}, which the {what} itself sets.")
 
 
 def play_graph(

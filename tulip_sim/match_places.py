@@ -13,6 +13,8 @@ import numpy as np
 
 from tulip_description.field import Field
 from tulip_description.planar import Pose2D, wrap_angle
+from tulip_sim.truth import Truth
+from tulip_sim.world import World
 
 Point = tuple[float, float]
 BEHIND = (0.8, 1.8)  # [m] from the striker to the ball
@@ -34,6 +36,12 @@ def turned(pose: Pose2D) -> Pose2D:
 def in_map_of(team: int, pose: Pose2D) -> Pose2D:
     """Return a pose in the map of team 0 or 1, given in the world's map; the other way round it is the same."""
     return pose if team == 0 else turned(pose)
+
+
+def team_truth(world: World, team: int) -> Truth:
+    """Return what really is about a team's robot, in the team's own map."""
+    truth = world.truth(team)
+    return truth if team == 0 else truth.turned()
 
 
 def striker_and_ball(rng: np.random.Generator, team: int, field: Field) -> tuple[Pose2D, Point]:

@@ -82,6 +82,7 @@ class MatchReferee:
         self._now = 0
         self._orders: list[Order] = []
         self._in_hands_until = [0, 0]  # [ns]
+        self._set_down_at: list[Pose2D | None] = [None, None]  # the last place of each
         self._scored: tuple[list[bool], list[bool]] = ([], [])
         self._began: int | None = None
         self._trial = 0
@@ -310,6 +311,9 @@ class MatchReferee:
         here, other = truths[robot].footprint, truths[1 - robot].footprint
         ball = truths[robot].ball_position
         occupied = [(other.x, other.y), (float(ball[0]), float(ball[1]))]
+        bound_for = self._set_down_at[1 - robot]
+        if bound_for is not None and self._now < self._in_hands_until[1 - robot]:
+            occupied.append((bound_for.x, bound_for.y))
         pose = beside_touch_line(here.x, here.y, outside, occupied, self._field)
         self._order([SetDown(robot, pose, self.roles[robot])])
 
@@ -318,6 +322,7 @@ class MatchReferee:
         self._orders.append(Order(tuple(robots), ball))
         for each in robots:
             self._in_hands_until[each.robot] = self._now + round(self._rules.hands_time * SECOND)
+            self._set_down_at[each.robot] = each.pose
 
     def _score(self, team: int) -> None:
         first, second = self._report.score

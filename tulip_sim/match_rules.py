@@ -22,6 +22,12 @@ class Role(Enum):
     KEEPER = "keeper"
 
 
+NAMESPACES = ("striker", "keeper")
+"""Of the two robots on topics: what each is in the first trial."""
+STRATEGY_OF = {Role.STRIKER: "dribble_and_kick", Role.KEEPER: "goalkeeper"}
+"""Names of the strategies that robots are told to play, unless others are chosen."""
+
+
 @dataclass(frozen=True)
 class MatchRules:
     """Times and rules of a match."""

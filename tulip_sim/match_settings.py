@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from tulip_sim.match_rules import COLOUR_NAMES, COLOURS, MatchRules, Role
+from tulip_sim.match_rules import COLOUR_NAMES, COLOURS, STRATEGY_OF, MatchRules, Role
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.robot_stack import RobotSettings
-
-NAMESPACES = ("striker", "keeper")
-"""Of the two robots on topics: what each is in the first trial."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +24,8 @@ class MatchSettings:
     world: WorldParameters = field(default_factory=WorldParameters)
     rules: MatchRules = field(default_factory=MatchRules)
     robots: tuple[RobotSettings, RobotSettings] = field(default_factory=lambda: (RobotSettings(), RobotSettings()))
-    striker: str = "dribble_and_kick"
-    keeper: str = "goalkeeper"
+    striker: str = STRATEGY_OF[Role.STRIKER]
+    keeper: str = STRATEGY_OF[Role.KEEPER]
 
     def strategy(self, role: Role) -> str:
         """Return what a robot is told to play."""

@@ -19,10 +19,9 @@ from tulip_ros.launch import Launcher
 from tulip_ros.plan import Start, make_plan
 from tulip_ros.run import ComponentNode, session
 from tulip_ros.time import stamp_of
-from tulip_sim.match_graph import ENDING, LOOK, NODES, SILENCE, UNRECORDED
+from tulip_sim.match_graph import ENDING, LOOK, NODES, SILENCE, UNRECORDED, refuse_taken
 from tulip_sim.match_report import MatchReport
-from tulip_sim.match_rules import COLOUR_NAMES, COLOURS, TEAMS, MatchRules
-from tulip_sim.match_settings import NAMESPACES, MatchSettings
+from tulip_sim.match_rules import COLOUR_NAMES, COLOURS, NAMESPACES, STRATEGY_OF, TEAMS, MatchRules, Role
 from tulip_sim.match_summary import MatchSummary
 from tulip_sim.messages import report_from_message
 from tulip_sim.trial import TrialObserver
@@ -95,8 +94,8 @@ def match_plan(
     parameter_files: Sequence[Path] = (),
     values: Values | None = None,
     referee_ports: tuple[int, int] = (REFEREE_PORT, REFEREE_PORT + 2),
-    striker: str = MatchSettings.striker,
-    keeper: str = MatchSettings.keeper,
+    striker: str = STRATEGY_OF[Role.STRIKER],
+    keeper: str = STRATEGY_OF[Role.KEEPER],
 ) -> tuple[Start, ...]:
     """Return the nodes of a match: one simulator, two robots, and a recorder if wanted.
 
@@ -111,7 +110,7 @@ def match_plan(
         keeper: Strategy that a goalkeeper is told to play.
 
     Raises:
-        BadInputError: for files that cannot be used.
+        BadInputError: for files that cannot be used, or that set what the match itself sets.
     """
     rules = rules or MatchRules()
     names = [f"{namespace}/{name}" for namespace in NAMESPACES for name in NODES]
@@ -128,6 +127,7 @@ def match_plan(
     }
     if record is not None:
         own["recorder"] = {"path": str(record.absolute()), "exclude": list(UNRECORDED), "robots": list(NAMESPACES)}
+    refuse_taken(parameter_files, own, "match")
     for name in ("driver", "recorder"):
         own.setdefault(name, {}).update((values or {}).get(name, {}))
     starts = [
@@ -148,6 +148,7 @@ def match_plan(
                 "team_colour": COLOURS[team].value,
             },
         }
+        refuse_taken(parameter_files, given, "match")
         for name, block in (values or {}).items():
             if name not in ("driver", "recorder"):
                 given.setdefault(name, {}).update(block)

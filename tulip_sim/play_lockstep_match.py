@@ -6,10 +6,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from tulip_sim.lockstep_match import LockstepMatch, team_truth
+from tulip_sim.lockstep_match import LockstepMatch
 from tulip_sim.lockstep_recording import LockstepRecording
-from tulip_sim.match_rules import TEAMS
-from tulip_sim.match_settings import NAMESPACES, MatchSettings
+from tulip_sim.match_places import team_truth
+from tulip_sim.match_rules import NAMESPACES, TEAMS
+from tulip_sim.match_settings import MatchSettings
 from tulip_sim.match_summary import MatchSummary
 from tulip_sim.trial import NO_CAMERA, TrialObserver
 from tulip_strategy.interface import GamePhase

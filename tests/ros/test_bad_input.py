@@ -54,6 +54,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+TWO = ["--teams", "2", "--keeper", "dribble_and_kick", "--no-record"]
+
+
 @pytest.mark.parametrize(
     ("main", "arguments", "words"),
     [
@@ -66,6 +69,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (match.main, [*PORTLESS, "--json", "none/x.json"], "--json none/x.json cannot be written"),
         (match.main, [*PORTLESS, "--json", "full"], "--json full cannot be written: Is a directory"),
         (match.main, [*PORTLESS, "--logs", "file/logs"], "Log folder file/logs cannot be made"),
+        (match.main, ["--teams", "2", "--keeper", "x"], "--keeper is 'x'; expected one of dribble_and_kick"),
+        (match.main, [*TWO, "--playing-time", "0"], "playing_time is 0.0 s; expected > 0"),
+        (match.main, [*TWO, "--eyes", "ideal"], "expected camera with two"),
+        (match.main, [*TWO, "--parameters", "seed.yaml"], "sets driver.seed, which the match itself sets"),
         (match.main, ["--mode", "lockstep", "--parameters", "node.yaml"], "expected --mode graph"),
         (match.main, ["--mode", "lockstep", "--scenario", "x"], "no scenario 'x'. Known: open, trial."),
         (match.main, ["--mode", "lockstep", "--record", "full"], "Recording folder full is not empty"),

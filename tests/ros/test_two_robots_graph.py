@@ -12,8 +12,7 @@ from rosbags.highlevel import AnyReader
 from tulip_ros import topics
 from tulip_sim.match_graph import NODES
 from tulip_sim.match_report import MatchReport
-from tulip_sim.match_rules import MatchRules
-from tulip_sim.match_settings import NAMESPACES
+from tulip_sim.match_rules import NAMESPACES, MatchRules
 from tulip_sim.match_two_graph import match_plan, play_match_graph
 from tulip_sim.messages import report_from_message
 

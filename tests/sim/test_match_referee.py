@@ -185,6 +185,19 @@ def test_a_robot_that_lies_too_long_is_taken_out_told_so_and_set_back_at_the_lin
     assert game.referee.report.trials == []  # the trial went on meanwhile
 
 
+def test_two_robots_that_are_taken_out_and_set_back_together_do_not_stand_in_one_another() -> None:
+    game = playing()
+    game.poses = [Pose2D(1.0, 1.0, 0.0), Pose2D(1.3, 1.0, 0.0)]
+    game.ball = (2.0, 1.0)
+    game.lying = [True, True]
+    game.go(RULES.lying_limit + 0.5)
+    assert game.said("is taken out") == 2
+    for _ in range(2):
+        assert math.dist((game.poses[0].x, game.poses[0].y), (game.poses[1].x, game.poses[1].y)) >= CLEARANCE
+        game.go(RULES.removal_time)
+    assert game.said("is set back in") == 2
+
+
 def test_a_striker_that_cannot_come_back_in_time_ends_the_trial() -> None:
     game = playing()
     game.go(RULES.playing_time - RULES.removal_time - RULES.lying_limit + 2.0)

@@ -18,7 +18,8 @@ from tulip_motion.interface import MotionMode, WalkCommand, WalkMode
 from tulip_motion.motion import Motion
 from tulip_motion.parameters import MotionParameters
 from tulip_sim.camera import CameraParameters, CameraRenderer
-from tulip_sim.lockstep_match import LockstepMatch, team_truth
+from tulip_sim.lockstep_match import LockstepMatch
+from tulip_sim.match_places import team_truth
 from tulip_sim.match_report import MatchReport
 from tulip_sim.match_rules import MatchRules, Role
 from tulip_sim.match_settings import MatchSettings
