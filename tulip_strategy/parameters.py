@@ -88,8 +88,8 @@ class StrategyParameters(GazeParameters):
 
     # Aim.
     opponent_radius: float = 0.30  # [m] keeper's half width and a step to the side
-    opponent_speed: float = 0.2  # [m/s] at which a keeper follows a shot
-    shot_mean_speed: float = 2.3  # [m/s] of a kicked ball over the last metres before the goal
+    opponent_reach: float = 0.087  # an opponent covers so much more to each side per metre from the ball: 0.6 of what a
+    # keeper at 0.2 m/s can step while a ball rolls at 1.4 m/s; all of it would close gaps that are worth a shot
     stuck_distance: float = 0.9  # [m] a ball this near an opponent that leaves no gap is passed sideways
     stuck_turn: float = math.radians(100.0)  # [rad] off the direction to that opponent
     stuck_pass: float = 1.2  # [m]
@@ -139,7 +139,6 @@ class StrategyParameters(GazeParameters):
     course_clearance: float = 0.75  # [m] of the dribbled ball from an obstacle's middle: room for the robot behind
 
     # Game.
-    game_state_limit: float = 30.0  # [s] no referee packet for so long: stand; shorter gaps are lost packets
     walk_to_ready: bool = False  # in dribble and kick the robot is placed by hand
     ready_x: float = -1.5  # [m] in map
     ready_y: float = 0.0  # [m] in map

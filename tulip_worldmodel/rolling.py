@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 DECELERATION = 0.35  # [m/s^2] of a ball on carpet; let one roll 2 m and stop the time to measure it
+ROLLING_SHARE = 0.6
+"""Of a kicked ball's speed that is left when it has ceased to slide: 1 / (1 + I / m r^2), with 2/3 for a thin shell."""
 LEAST_VARIANCE = 1e-12  # [m^2/s^2] keeps the inverse of a velocity's covariance finite
 
 

@@ -18,7 +18,7 @@ from tulip_strategy.behaviour.path import distance_to_way
 from tulip_strategy.interface import Decision, GamePhase, UserCommand, UserRequest
 from tulip_strategy.parameters import StrategyParameters
 from tulip_strategy.strategy import Strategy
-from tulip_worldmodel.rolling import DECELERATION
+from tulip_worldmodel.rolling import DECELERATION, ROLLING_SHARE
 from tulip_worldmodel.world_state import RobotEstimate, WorldState
 
 FIELD = load_field()
@@ -59,13 +59,13 @@ def before_the_foot(pose: Pose2D) -> Point:
 
 def test_throw_in_kicks_once_with_the_speed_from_which_the_ball_stops_at_the_target() -> None:
     pose = Pose2D(0.5, -3.2, 0.5 * math.pi)
-    parameters = replace(PARAMETERS, throw_target_x=before_the_foot(pose)[0], throw_target_y=0.0)
+    parameters = replace(PARAMETERS, throw_target_x=before_the_foot(pose)[0])
     player, ball = Player("throw_in", pose, parameters), before_the_foot(pose)
     decisions = [player.tick(ball) for _ in range(60)]
     kicks = [each.kick for each in decisions if each.kick is not None]
     assert len(kicks) >= 1
     assert kicks[0].direction == pytest.approx(0.0, abs=0.05)
-    assert kicks[0].speed ** 2 / (2.0 * DECELERATION) == pytest.approx(-ball[1], rel=0.02)
+    assert (ROLLING_SHARE * kicks[0].speed) ** 2 / (2.0 * DECELERATION) == pytest.approx(-ball[1], rel=0.02)
     for _ in range(20):
         player.tick(ball, mode=MotionMode.KICK)
     after = [player.tick(ball) for _ in range(60)]

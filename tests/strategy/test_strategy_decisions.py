@@ -10,7 +10,7 @@ from kinematic_bench import game_state, motion_state, seen_object
 from tulip_description.field import load_field
 from tulip_description.planar import Pose2D
 from tulip_motion.interface import HeadMode, MotionMode, Side, WalkMode
-from tulip_strategy.interface import Decision, GamePhase, GameState, UserCommand, UserRequest
+from tulip_strategy.interface import Decision, GamePhase, UserCommand, UserRequest
 from tulip_strategy.parameters import StrategyParameters
 from tulip_strategy.strategy import Strategy
 from tulip_worldmodel.world_state import ObjectEstimate, RobotEstimate, WorldState
@@ -78,17 +78,17 @@ def test_penalised_robot_stands() -> None:
     assert "penalised" in decision.tree
 
 
-def test_robot_stands_without_world_state_or_referee_and_when_the_referee_is_silent_for_long() -> None:
+def test_robot_stands_before_the_first_world_state_and_the_first_packet() -> None:
     strategy = Strategy(PARAMETERS, FIELD)
-    late = 31 * 10**9
-    game: GameState = game_state(0)
-    for seen, known_game, stamp in (
-        (None, game, 0),
-        (world(ball_at(1, 0)), None, 0),
-        (world(ball_at(1, 0)), game, late),
-    ):
-        assert strategy.decide(stamp, seen, known_game, PLAY, None).walk.mode is WalkMode.STAND
-    assert strategy.decide(late, world(ball_at(1, 0)), game_state(late), PLAY, None).walk.mode is WalkMode.WALK
+    for seen, game in ((None, game_state(0)), (world(ball_at(1, 0)), None)):
+        assert strategy.decide(0, seen, game, PLAY, None).walk.mode is WalkMode.STAND
+
+
+def test_robot_keeps_to_the_last_packet_when_the_referee_falls_silent() -> None:
+    strategy = Strategy(PARAMETERS, FIELD)
+    late = 60 * 10**9
+    silent = replace(game_state(0), stale=True)
+    assert strategy.decide(late, world(ball_at(1, 0)), silent, PLAY, None).walk.mode is WalkMode.WALK
 
 
 @pytest.mark.parametrize(

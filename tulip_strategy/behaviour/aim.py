@@ -156,7 +156,7 @@ class Aim:
             in_front or [middle],  # a keeper not seen yet most likely stands in the middle
             p.opponent_radius,
             self._field.ball_radius,
-            p.opponent_speed / p.shot_mean_speed,
+            p.opponent_reach,
         )
         if not gaps and in_front:
             nearest = min(in_front, key=lambda point: math.dist(ball, point))

@@ -12,7 +12,7 @@ from tulip_strategy.behaviour.context import Context
 from tulip_strategy.behaviour.gaze import track_ball
 from tulip_strategy.behaviour.kick import line_up_and_kick
 from tulip_strategy.behaviour.search import find_lost_ball
-from tulip_worldmodel.rolling import DECELERATION
+from tulip_worldmodel.rolling import DECELERATION, ROLLING_SHARE
 
 
 def throw_in(context: Context) -> Sequence:
@@ -29,13 +29,13 @@ def throw_in(context: Context) -> Sequence:
 
 
 def aim_at_target(context: Context) -> None:
-    """Aim at the target, with the speed from which a rolling ball stops there: v^2 = 2 a d."""
+    """Aim at the target, with the speed from which the ball stops there: it slides, then rolls with v^2 = 2 a d."""
     world, ball, p = context.world, context.ball.position, context.parameters
     if world is None or ball is None:
         return
     target = (p.throw_target_x, p.throw_target_y)
     way = math.dist(world.robot.pose.transform(ball), target)
-    context.aim.at_point(world, ball, target, context.dt, math.sqrt(2.0 * DECELERATION * way))
+    context.aim.at_point(world, ball, target, context.dt, math.sqrt(2.0 * DECELERATION * way) / ROLLING_SHARE)
 
 
 def _watch(context: Context) -> None:

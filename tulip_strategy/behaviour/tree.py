@@ -44,7 +44,7 @@ def build_tree(context: Context) -> Behaviour:
             _when("walk test", context, _wants(UserRequest.WALK_TEST), Act("walk", context, _walk_test)),
             _when("kick test", context, _wants(UserRequest.KICK_TEST), KickTest(context)),
             _when("no world state", context, lambda c: c.world is None, Act("stand", context, _rest)),
-            _when("no referee", context, _without_referee, Act("stand", context, _rest)),
+            _when("no referee yet", context, lambda c: c.game is None, Act("stand", context, _rest)),
             _when("penalised", context, lambda c: c.game is not None and c.game.penalty != 0, _still("stand", context)),
             _when("halted", context, lambda c: c.game is not None and c.game.halted, _still("stand still", context)),
             _when("initial", context, _in_phase(GamePhase.INITIAL), Act("stand", context, _rest)),
@@ -106,11 +106,6 @@ def _in_phase(phase: GamePhase) -> Callable[[Context], bool]:
 
 def _is_fallen(context: Context) -> bool:
     return context.motion is not None and context.motion.mode is MotionMode.FALLEN
-
-
-def _without_referee(context: Context) -> bool:
-    game = context.game
-    return game is None or context.seconds_since(game.stamp) > context.parameters.game_state_limit
 
 
 def _limp(context: Context) -> None:
