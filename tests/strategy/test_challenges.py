@@ -92,10 +92,17 @@ def test_the_way_of_a_dribbled_ball_keeps_clear_of_the_obstacles(obstacles: tupl
 
 
 def test_the_course_is_dribbled_past_an_obstacle_and_not_kicked_against_it() -> None:
-    pose = Pose2D(0.5, 0.0, 0.0)
-    ball = before_the_foot(pose)
-    blocked = Player("dribble_course", pose)
-    assert all(blocked.tick(ball, ((2.2, 0.2),)).kick is None for _ in range(60))
+    """The robot stands as for a kick along the first piece of the ball's way."""
+    for obstacles, kicks, x in ((((2.2, -0.3),), False, 1.2), ((), True, 2.6)):
+        pose = Pose2D(x, 0.0, 0.0)
+        for _ in range(5):  # until it faces where it aims
+            player = Player("dribble_course", pose)
+            player.tick(before_the_foot(pose), obstacles)
+            pose = replace(pose, yaw=pose.yaw + player.strategy._context.aim.direction)
+        player = Player("dribble_course", pose)
+        decisions = [player.tick(before_the_foot(pose), obstacles) for _ in range(60)]
+        assert any(each.kick is not None for each in decisions) is kicks
+        assert kicks or decisions[-1].tree.endswith("dribble")
 
 
 def test_a_glance_lasts_a_moment_and_comes_again_after_a_while() -> None:

@@ -7,7 +7,7 @@ import math
 from py_trees.composites import Selector, Sequence
 
 from tulip_strategy.behaviour.approach import Approach, BehindBall
-from tulip_strategy.behaviour.base import Do
+from tulip_strategy.behaviour.base import Condition, Do
 from tulip_strategy.behaviour.context import Context, Point
 from tulip_strategy.behaviour.dribble import Dribble
 from tulip_strategy.behaviour.kick import kick_at_goal
@@ -18,8 +18,8 @@ from tulip_strategy.behaviour.search import find_lost_ball
 def dribble_course(context: Context) -> Sequence:
     """Return the subtree: dribble along a way that keeps clear of the obstacles, kick where none is left."""
     course = _Course(context)
-    kick = Sequence("nothing in the way", memory=False)
-    kick.add_children([kick_at_goal(context)])
+    kick = Sequence("shoot", memory=False)
+    kick.add_children([Condition("nothing in the way", context, lambda _: course.free), kick_at_goal(context)])
     forward = Selector("kick or dribble", memory=False)
     forward.add_children([kick, Dribble(context)])
     attack = Sequence("attack", memory=False)
@@ -32,11 +32,16 @@ def dribble_course(context: Context) -> Sequence:
 
 
 class _Course:
-    """Finds the ball's way, and keeps to the side on which it passes an obstacle."""
+    """Finds the ball's way, and keeps to the side on which it passes an obstacle.
+
+    Attributes:
+        free: Whether nothing is left between ball and goal.
+    """
 
     def __init__(self, context: Context) -> None:
         self._clearance = context.parameters.course_clearance
         self._side = 0
+        self.free = False
 
     def aim(self, context: Context) -> None:
         """Aim at the next place of the ball's way to the goal; at the goal itself where the way is free."""
@@ -48,7 +53,8 @@ class _Course:
         obstacles = [(float(o.position_in_map[0]) - x, float(o.position_in_map[1]) - y) for o in context.opponents]
         target = (goal.x - x, -y)
         way = self.next_place(target, obstacles)
-        if way == target:
+        self.free = way == target
+        if self.free:
             context.aim.at_goal(world, ball, context.opponents, context.dt)
         else:
             context.aim.at_point(world, ball, (x + way[0], y + way[1]), context.dt)
