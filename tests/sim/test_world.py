@@ -397,3 +397,28 @@ def test_accelerations_in_free_flight_equal_the_model(make_world: MakeWorld, var
     np.testing.assert_allclose(joints, expected[6:], rtol=0.02, atol=0.5)
     np.testing.assert_allclose(rotation.T @ after.base_angular_velocity / 1e-3, expected[3:6], rtol=0.02, atol=0.2)
     np.testing.assert_allclose(rotation.T @ after.base_linear_velocity / 1e-3, expected[:3], rtol=0.02, atol=0.2)
+
+
+def test_a_keeper_that_follows_the_ball_goes_level_with_it_and_no_further_than_the_goal(make_world: MakeWorld) -> None:
+    keeper = Keeper(Pose2D(4.2, 0.0, np.pi), speed=0.2, follows=1.0)
+    world = make_world(replace(FAR, ball=(0.0, 0.3), keeper=keeper), EXACT)
+    world.advance(1000)
+    first = world.truth().keeper
+    assert first is not None
+    assert first.y == pytest.approx(0.2, abs=1e-6)
+    world.advance(1000)
+    assert world.truth().keeper == Pose2D(4.2, pytest.approx(0.3, abs=1e-6), np.pi)
+    world.place_ball(0.0, 2.9)
+    world.advance(5000)
+    assert world.truth().keeper == Pose2D(4.2, pytest.approx(1.0, abs=1e-6), np.pi)
+    with pytest.raises(ValueError, match="follows is 1"):
+        Keeper(Pose2D(4.2, 0.0, np.pi), ((4.2, 1.0),), follows=1.0)
+
+
+def test_obstacles_stand_in_the_balls_way(make_world: MakeWorld) -> None:
+    scenario = replace(FAR, obstacles=(Pose2D(1.0, 0.15, np.pi),))
+    world = make_world(scenario, EXACT)
+    assert world.truth().figures == scenario.obstacles
+    world.place_ball(0.0, 0.15, 2.0, 0.0)
+    world.advance(2000)
+    assert world.truth().ball_position[0] < 1.0
