@@ -181,6 +181,7 @@ class MatchReferee:
                     self._report.score[team],
                     tuple(players),
                     tuple(self._scored[team]),
+                    goalkeeper=rules.player_number if team == self._keeper else 0,
                 )
             )
         return Situation(

@@ -115,11 +115,13 @@ def test_a_trial_begins_with_both_robots_and_the_ball_set_down_and_goes_through_
 
 def test_roles_change_with_each_trial_and_the_score_belongs_to_the_teams() -> None:
     game = playing()
+    assert [team.goalkeeper for team in game.referee.situation().teams] == [0, RULES.player_number]
     game.ball = (OVER, 0.3)
     game.go(0.1)
     assert game.referee.report.score == (1, 0)
     game.play()
     assert game.referee.roles == (Role.KEEPER, Role.STRIKER)
+    assert [team.goalkeeper for team in game.referee.situation().teams] == [RULES.player_number, 0]
     game.ball = (-OVER, 0.3)  # the second team attacks the other goal
     game.go(0.1)
     report = game.referee.report
