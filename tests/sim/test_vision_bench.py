@@ -10,12 +10,13 @@ import pytest
 from tulip_description.field import load_field
 from tulip_description.planar import Pose2D
 from tulip_description.robot import load_robot
+from tulip_sim.bench.vision_goals import GoalCounts, count_goals
 from tulip_sim.bench.vision_score import Judge, Sighting
 from tulip_sim.bench.vision_shots import Shot, shots, true_camera_pose, vision_of
 from tulip_sim.bench.vision_tables import figures
-from tulip_sim.bench.vision_truth import Hiding, line_distances
+from tulip_sim.bench.vision_truth import Hiding, Thing, line_distances
 from tulip_sim.scene import Body, Boxes, scene_of
-from tulip_vision.features import FeatureClass, Features
+from tulip_vision.features import Feature, FeatureClass, Features
 from tulip_vision.lens import head_camera_lens
 from tulip_vision.own_body import OwnBody
 from tulip_vision.view import SpreadParameters, View
@@ -96,11 +97,37 @@ def test_the_bars_count_what_was_missed_and_what_is_false() -> None:
     missed = Sighting("ball", "BALL", 1, "stand", "whole", 3.0, False)
     false = Sighting("ball", "BALL", 2, "stand", "false", math.nan, True)
     texts = [each.to_text() for each in (seen, missed, false)]
-    row = {"pictures": 3, "sightings": texts, "line points, believed": [9, 9, 9, 9], "line points, own": [9, 9, 9, 9]}
+    lines = {"line points, believed": [9, 9, 9, 9], "line points, own": [9, 9, 9, 9]}
+    goals = vars(GoalCounts(there=4, paired=3, false=1, posts=9, sided=7, wrong=0))
+    row = {"pictures": 3, "sightings": texts, **lines, "goals": goals}
     table = {what: (value, reached) for what, _, value, reached in figures([row])}
     assert table["ball, to 6 m"] == ("0.500 (1 of 2)", False)
     assert table["false balls"] == ("1 in 3 pictures", False)
     assert table["ball, range under 4.5 m"][1]
+    assert table["goals: the two posts of one paired, to 9 m"] == ("0.750 (3 of 4); 1 false", False)
+    assert table["posts: left or right one of its goal"] == ("7 of 9 have one; 0 wrong", True)
+
+
+def test_goals_and_sides_are_compared_with_where_the_posts_stand() -> None:
+    feet = np.array([[-6.0, 1.4, 0.0], [-6.0, -1.4, 0.0], [4.0, 1.4, 0.0], [4.0, -1.4, 0.0]])
+    posts = [Thing((FeatureClass.GOAL_POST,), foot, math.hypot(*foot[:2]), foot[0] > 0.0) for foot in feet]
+    left, right = math.atan2(1.4, 4.0), math.atan2(-1.4, 4.0)
+
+    def goal(first: float, second: float) -> Feature:
+        return Feature(FeatureClass.GOAL, first, -0.25, 0.01, 0.01, 1.0, second, -0.25)
+
+    def post(azimuth: float, side: int) -> Feature:
+        return Feature(FeatureClass.GOAL_POST, azimuth, -0.25, 0.01, 0.01, 1.0, side=side)
+
+    def count(*features: Feature) -> GoalCounts:
+        return count_goals(features, posts, np.array([0.0, 0.0, 1.1]))
+
+    assert count(goal(left, right), post(left, 1), post(right, -1)) == GoalCounts(1, 1, 0, 2, 2, 0)
+    assert count(goal(right, left)) == GoalCounts(1, 0, 1)  # left and right mixed up
+    assert count(goal(left, right - 0.3)) == GoalCounts(1, 0, 1)
+    assert count(post(left, -1), post(right, 0)) == GoalCounts(1, 0, 0, 2, 1, 1)
+    behind = post(math.pi - math.atan2(1.4, 6.0), -1)  # seen from between the goals, +y is on the right there
+    assert count(behind) == GoalCounts(1, 0, 0, 1, 1, 0)
 
 
 def test_the_own_body_is_where_the_renderer_draws_it(taken: list[Shot]) -> None:
