@@ -21,7 +21,7 @@ from tulip_ros.run import ComponentNode, session
 from tulip_ros.time import stamp_of
 from tulip_sim.match_graph import ENDING, LOOK, NODES, SILENCE, UNRECORDED, refuse_taken
 from tulip_sim.match_report import MatchReport
-from tulip_sim.match_rules import COLOUR_NAMES, COLOURS, NAMESPACES, STRATEGY_OF, TEAMS, MatchRules, Role
+from tulip_sim.match_rules import COLOUR_NAMES, NAMESPACES, STRATEGY_OF, TEAMS, MatchRules, Role
 from tulip_sim.match_summary import MatchSummary
 from tulip_sim.messages import report_from_message
 from tulip_sim.trial import TrialObserver
@@ -145,7 +145,7 @@ def match_plan(
                 "reply_port": referee_ports[team],  # the referee is on this machine: it is answered where it sent from
                 "team_number": rules.team_numbers[team],
                 "player_number": rules.player_number,
-                "team_colour": COLOURS[team].value,
+                "team_colour": COLOUR_NAMES[team],
             },
         }
         refuse_taken(parameter_files, given, "match")

@@ -74,7 +74,7 @@ TWO = ["--teams", "2", "--keeper", "dribble_and_kick", "--no-record"]
         (match.main, [*TWO, "--eyes", "ideal"], "expected camera with two"),
         (match.main, [*TWO, "--parameters", "seed.yaml"], "sets driver.seed, which the match itself sets"),
         (match.main, ["--mode", "lockstep", "--parameters", "node.yaml"], "expected --mode graph"),
-        (match.main, ["--mode", "lockstep", "--scenario", "x"], "no scenario 'x'. Known: open, trial."),
+        (match.main, ["--mode", "lockstep", "--scenario", "x"], "no scenario 'x'. Known: dribble_course, open"),
         (match.main, ["--mode", "lockstep", "--record", "full"], "Recording folder full is not empty"),
         (match.main, ["--mode", "lockstep", "--record", "file/bag"], "cannot be written: Not a directory"),
         (launch.main, ["visoin"], "no node 'visoin'. Did you mean vision?"),
