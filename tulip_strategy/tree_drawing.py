@@ -21,7 +21,7 @@ def terminal_tree(state: TreeState, whole: bool = False) -> Tree:
 
     Args:
         state: The tree after a decision.
-        whole: Also what is below nodes that were not asked.
+        whole: Also nodes that were not asked.
     """
     drawn: list[Tree | None] = []
     root = Tree("")
@@ -33,7 +33,7 @@ def terminal_tree(state: TreeState, whole: bool = False) -> Tree:
             drawn.append(root)
             continue
         above = drawn[parent]
-        hidden = above is None or (not whole and state.statuses[parent] is NodeStatus.IDLE)
+        hidden = above is None or (not whole and status is NodeStatus.IDLE)
         drawn.append(None if hidden or above is None else above.add(label))
     return root
 
