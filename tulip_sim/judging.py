@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_description.field import Field, Goal
+from tulip_strategy.interface import GamePhase
 
 Array = NDArray[np.float64]
 SECOND = 10**9  # [ns]
@@ -32,6 +33,15 @@ class Verdict:
     lying: bool
     falls: int
     played: float
+
+
+def phase_after(elapsed: float, initial: float, ready: float, set_up: float) -> GamePhase:
+    """Return the phase of a trial that has not ended, by the time since its beginning and the lengths of phases [s]."""
+    for phase, duration in ((GamePhase.INITIAL, initial), (GamePhase.READY, ready), (GamePhase.SET, set_up)):
+        if elapsed < duration:
+            return phase
+        elapsed -= duration
+    return GamePhase.PLAYING
 
 
 def in_goal(ball: Array, goal: Goal, field: Field) -> bool:

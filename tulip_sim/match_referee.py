@@ -10,7 +10,7 @@ import numpy as np
 
 from tulip_description.field import Field
 from tulip_description.planar import Pose2D
-from tulip_sim.judging import SECOND, FallWatch, OutWatch, Verdict, in_goal
+from tulip_sim.judging import SECOND, FallWatch, OutWatch, Verdict, in_goal, phase_after
 from tulip_sim.match_places import (
     OUTSIDE,
     Point,
@@ -113,16 +113,8 @@ class MatchReferee:
         """The game's phase at the last truth."""
         if self._result is not None:
             return GamePhase.FINISHED
-        left, rules = self._elapsed(), self._rules
-        for phase, duration in (
-            (GamePhase.INITIAL, rules.initial_time),
-            (GamePhase.READY, rules.ready_time),
-            (GamePhase.SET, rules.set_time),
-        ):
-            if left < duration:
-                return phase
-            left -= duration
-        return GamePhase.PLAYING
+        p = self._rules
+        return phase_after(self._elapsed(), p.initial_time, p.ready_time, p.set_time)
 
     @property
     def played(self) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from tulip_description.field import Field
-from tulip_sim.judging import SECOND, FallWatch, OutWatch, Verdict, in_goal
+from tulip_sim.judging import SECOND, FallWatch, OutWatch, Verdict, in_goal, phase_after
 from tulip_sim.referee_packets import PLAYERS, write_packet
 from tulip_sim.situation import PlayerSituation, Removal, Situation, TeamSituation
 from tulip_sim.truth import Truth
@@ -145,17 +145,8 @@ class Referee:
         """The game's phase at the last truth."""
         if self._outcome is not None:
             return GamePhase.FINISHED
-        elapsed = self._elapsed()
-        parameters = self._parameters
-        for phase, duration in (
-            (GamePhase.INITIAL, parameters.initial_time),
-            (GamePhase.READY, parameters.ready_time),
-            (GamePhase.SET, parameters.set_time),
-        ):
-            if elapsed < duration:
-                return phase
-            elapsed -= duration
-        return GamePhase.PLAYING
+        p = self._parameters
+        return phase_after(self._elapsed(), p.initial_time, p.ready_time, p.set_time)
 
     @property
     def played(self) -> float:
