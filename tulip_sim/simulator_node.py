@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -180,7 +181,7 @@ class RobotPort:
             self._node.health.count("refused joint commands", f"joint command refused: {reason}")
 
 
-class SimulatorNode(ComponentNode):
+class SimulatorNode(ComponentNode, ABC):
     """Owns a world and its time. Who inherits makes the world, and judges."""
 
     world: World
@@ -206,13 +207,13 @@ class SimulatorNode(ComponentNode):
         self._started = False
         self._paced_from = (time.monotonic(), 0)
 
+    @abstractmethod
     def judge(self, spin: Spin) -> Sequence[tuple[Truth, Verdict]]:
-        """Let the referee see what is; return the truth about each robot and what there is to say of it. To override.
+        """Let the referee see what is; return the truth about each robot and what there is to say of it.
 
         Args:
             spin: Waits for messages.
         """
-        raise NotImplementedError
 
     @property
     def interrupted(self) -> bool:

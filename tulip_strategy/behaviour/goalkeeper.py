@@ -44,14 +44,14 @@ class Block(Leaf):
 
     def __init__(self, context: Context) -> None:
         super().__init__("block", context)
-        self._begun: int | None = None
+        self._blocks = False
 
     def update(self) -> Status:
         """Step."""
         context, parameters = self.context, self.context.parameters
         crossing = self._crossing()
+        self._blocks = crossing is not None
         if crossing is None:
-            self._begun = None
             return Status.FAILURE
         look_at_ball(context)
         off = math.copysign(max(abs(crossing) - parameters.keeper_cover, 0.0), crossing)
@@ -67,8 +67,7 @@ class Block(Leaf):
             return None
         vx, vy = ball.velocity
         speed = math.hypot(vx, vy)
-        begins = self._begun is None
-        if speed < (parameters.keeper_shot_speed if begins else parameters.keeper_shot_over):
+        if speed < (parameters.keeper_shot_over if self._blocks else parameters.keeper_shot_speed):
             return None
         ahead = ball.position[0] - parameters.keeper_toes
         if ahead <= 0.0 or vx >= -0.3 * speed:
@@ -78,7 +77,6 @@ class Block(Leaf):
             return None  # it stops before
         if not self._threatens_goal(world.robot.pose, ball.position, (vx, vy)):
             return None
-        self._begun = context.stamp if begins else self._begun
         return ball.position[1] + vy * way / speed
 
     def _threatens_goal(self, pose: Pose2D, ball: Point, velocity: Point) -> bool:
