@@ -41,7 +41,7 @@ class MatchWatcher(ComponentNode):
         self.heard = time.monotonic()
         self.report = MatchReport()
         self.stamp = 0  # [ns]
-        self.plays = False
+        self._plays = [False for _ in TEAMS]  # as each robot's last truth says: the two come one after the other
         self.doing = ["", ""]
         self.observers = [TrialObserver() for _ in TEAMS]
         self._first: tuple[float, int] | None = None
@@ -59,8 +59,8 @@ class MatchWatcher(ComponentNode):
             self.heard, self.stamp = time.monotonic(), stamp_of(message)
             if self._first is None:
                 self._first = (self.heard, self.stamp)
-            self.plays = message.trial_time > 0.0 and not message.outcome
-            if self.plays:
+            self._plays[team] = message.trial_time > 0.0 and not message.outcome
+            if self._plays[team]:
                 pose, turn = message.robot.position, message.robot.orientation
                 self.observers[team].see_truth(pose_on_ground((pose.x, pose.y), (turn.x, turn.y, turn.z, turn.w)))
 
@@ -68,7 +68,7 @@ class MatchWatcher(ComponentNode):
 
     def _estimate_of(self, team: int) -> Callable[[WorldState], None]:
         def on_estimate(message: WorldState) -> None:
-            if self.plays:
+            if self._plays[team]:
                 self.observers[team].see_estimate(Pose2D(*(float(value) for value in message.robot_pose)))
 
         return on_estimate
