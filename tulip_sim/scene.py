@@ -67,6 +67,10 @@ class Boxes:
             np.concatenate([self.colours, other.colours]),
         )
 
+    def after(self, count: int) -> Boxes:
+        """Return all but the first ones."""
+        return Boxes(self.transforms[count:], self.sizes[count:], self.colours[count:])
+
     def inside(self, view: View, camera_in_map: Array) -> Boxes:
         """Return those that a camera may see, by their bounding spheres."""
         middles = (self.transforms[:, :3, 3] - camera_in_map[:3, 3]) @ camera_in_map[:3, :3]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from tulip_description.planar import Pose2D, wrap_angle
 from tulip_description.posture import standing_posture
 from tulip_description.robot import Robot
 from tulip_sim.bench.vision_truth import GROUPS, Thing, things
-from tulip_sim.scene import Body, scene_of
+from tulip_sim.scene import Body
 from tulip_sim.truth import Truth
 from tulip_vision.features import Feature, Features
 from tulip_vision.pipeline import Vision
@@ -172,8 +172,7 @@ def evaluate(
         assert vision.last is not None
         view = vision.last.view
         problems: list[str] = []
-        own, _ = scene_of(replace(truth_of(scene), keeper=None), body, "cyan")
-        for name, present in things(truth_of(scene), own.boxes, field, view).items():
+        for name, present in things(truth_of(scene), body, field, view).items():
             found = [each for each in features.features if each.kind in GROUPS[name]]
             _compare(name, present, found, view, tallies[name], problems)
         if inspect is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from tulip_description.planar import wrap_angle
 from tulip_description.robot import Robot
 from tulip_sim.bench.vision_shots import Shot
 from tulip_sim.bench.vision_truth import GROUPS, Thing, border_distances, line_distances, things
-from tulip_sim.scene import Body, scene_of
+from tulip_sim.scene import Body
 from tulip_vision.features import Feature, FeatureClass, Features
 from tulip_vision.lens import Lens
 from tulip_vision.view import SpreadParameters, View, angles, direction_of
@@ -117,8 +117,7 @@ class Judge:
     def things(self, shot: Shot) -> dict[str, list[Thing]]:
         """Return what a picture shows, by the names of `GROUPS`."""
         view = View(self._lens, shot.true, SpreadParameters())
-        scene, _ = scene_of(replace(shot.truth, keeper=None), self._body, "cyan")
-        return things(shot.truth, scene.boxes, self._field, view)
+        return things(shot.truth, self._body, self._field, view)
 
     def line_errors(self, shot: Shot, features: Features) -> LineErrors:
         """Return how far the pieces of line of a picture are from the field's lines."""

@@ -1,8 +1,9 @@
 """Pictures of random scenes by a robot that stands or walks, each with what the robot itself knew and with the truth.
 
 The robot walks in the physics, far from everything; for each picture it is then moved to a random place on the field,
-with ball, keeper and poles. Camera poses come the way that they come in a match: joints, IMU and motion control's
-odometry through the pose buffer. The world is rendered for every millisecond of the exposure.
+with ball, an opponent and poles. Every other opponent is a still figure, the rest are robots that do just what this one
+does. Camera poses come the way that they come in a match: joints, IMU and motion control's odometry through the pose
+buffer. The world is rendered for every millisecond of the exposure.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from tulip_sim.camera import CameraParameters, CameraRenderer
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.scenario import Scenario
 from tulip_sim.timing import SLOW_TICKS, TICK
-from tulip_sim.truth import Truth
+from tulip_sim.truth import OtherRobot, Truth
 from tulip_sim.world import World
 from tulip_vision.lens import head_camera_lens
 from tulip_vision.opponents import OpponentParameters
@@ -165,7 +166,7 @@ def shots(seed: int) -> Iterator[Shot]:
     try:
         body.go(SETTLING)
         walks = random_commands(rng, 60.0)
-        for movement in MOVEMENTS:
+        for number, movement in enumerate(MOVEMENTS):
             pan = _look_somewhere(body, movement, rng)
             if movement != "stand":
                 _walk_somehow(body, walks)
@@ -180,7 +181,7 @@ def shots(seed: int) -> Iterator[Shot]:
                 raise RuntimeError(f"no camera pose for a picture at {middle.stamp} ns")
             if movement == "sweep":
                 pan = float(middle.joint_positions[12])
-            arrange = _arranged(middle, pan, field, rng)
+            arrange = _arranged(middle, pan, field, rng, opponent_is_robot=number % 2 == 1)
             picture = renderer.render_over([arrange(each) for each in states], rng)
             truth = arrange(middle)
             yield Shot(
@@ -222,23 +223,37 @@ def _walk_somehow(body: Photographer, walks: Iterator[tuple[float, tuple[float, 
 class _Arrangement:
     move: Pose2D  # from where the physics has the robot to the field
     ball: Array  # (3,) [m]
-    keeper: Pose2D
+    keeper: Pose2D | None
+    robot: Pose2D | None  # from where the physics has the robot to where its double stands
 
     def __call__(self, truth: Truth) -> Truth:
-        x, y = self.move.transform((float(truth.base_position[0]), float(truth.base_position[1])))
-        turn = (0.0, 0.0, math.sin(self.move.yaw / 2), math.cos(self.move.yaw / 2))
+        position, orientation = _moved(truth, self.move)
+        others = () if self.robot is None else (OtherRobot(*_moved(truth, self.robot), truth.joint_positions),)
         return replace(
             truth,
-            base_position=np.array([x, y, float(truth.base_position[2])]),
-            base_orientation=np.array(quaternion_product(turn, truth.base_orientation.tolist())),
+            base_position=position,
+            base_orientation=orientation,
             ball_position=self.ball,
             keeper=self.keeper,
+            others=others,
             poles=True,
         )
 
 
-def _arranged(truth: Truth, pan: float, field: Field, rng: np.random.Generator) -> _Arrangement:
-    """Draw where on the field the robot, the ball and the keeper are, with something to see ahead."""
+def _moved(truth: Truth, move: Pose2D) -> tuple[Array, Array]:
+    """Return position and orientation of base_link after a move over the ground."""
+    x, y = move.transform((float(truth.base_position[0]), float(truth.base_position[1])))
+    turn = (0.0, 0.0, math.sin(move.yaw / 2), math.cos(move.yaw / 2))
+    return (
+        np.array([x, y, float(truth.base_position[2])]),
+        np.array(quaternion_product(turn, truth.base_orientation.tolist())),
+    )
+
+
+def _arranged(
+    truth: Truth, pan: float, field: Field, rng: np.random.Generator, opponent_is_robot: bool
+) -> _Arrangement:
+    """Draw where on the field the robot, the ball and the opponent are, with something to see ahead."""
     x = rng.uniform(-field.length / 2 - 0.2, field.length / 2 - 0.6)
     y = rng.uniform(-field.width / 2, field.width / 2)
     seen = rng.uniform(-0.5, 0.5, 2) * (field.length, field.width)  # a picture of the hall's wall tells little
@@ -247,16 +262,20 @@ def _arranged(truth: Truth, pan: float, field: Field, rng: np.random.Generator) 
     ball = _place(x, y, heading, (0.5, FARTHEST_BALL), field, rng)
     if ball is None or rng.uniform() > BALL_SHARE:
         ball = (x - math.cos(heading), y - math.sin(heading))
-    keeper = None
+    ahead = None
     if rng.uniform() < 0.6:
-        keeper = _place(x, y, heading, (1.0, 8.5), field, rng)
+        ahead = _place(x, y, heading, (1.0, 8.5), field, rng)
     place = Pose2D(field.length / 2 - 0.3, float(rng.uniform(-1.0, 1.0)), math.pi)
-    if keeper is not None:
-        place = Pose2D(*keeper, float(rng.uniform(-math.pi, math.pi)))
+    if ahead is not None:
+        place = Pose2D(*ahead, float(rng.uniform(-math.pi, math.pi)))
     if math.hypot(place.x - x, place.y - y) < 0.7 or math.hypot(place.x - ball[0], place.y - ball[1]) < 0.3:
         place = Pose2D(20.0, 20.0, 0.0)  # they would stand in one another
+    home = truth.footprint.inverse()
     return _Arrangement(
-        Pose2D(float(x), float(y), float(yaw)) @ truth.footprint.inverse(), np.array([*ball, field.ball_radius]), place
+        Pose2D(float(x), float(y), float(yaw)) @ home,
+        np.array([*ball, field.ball_radius]),
+        None if opponent_is_robot else place,
+        place @ home if opponent_is_robot else None,
     )
 
 

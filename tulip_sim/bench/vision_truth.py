@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tulip_description.field import Field
 from tulip_description.planar import Pose2D
-from tulip_sim.scene import Boxes, keeper_boxes
+from tulip_sim.scene import Body, Boxes, scene_of
 from tulip_sim.truth import Truth
 from tulip_vision.features import FeatureClass
 from tulip_vision.view import View
@@ -109,26 +109,27 @@ class Hiding:
         return cut
 
 
-def things(truth: Truth, body: Boxes, field: Field, view: View) -> dict[str, list[Thing]]:
+def things(truth: Truth, body: Body, field: Field, view: View) -> dict[str, list[Thing]]:
     """Return what a picture shows, by the names of `GROUPS`.
 
     Args:
         truth: The world.
-        body: The robot's own, in map.
+        body: The robot's own.
         field: Goals, poles and lines.
         view: The picture's true geometry.
     """
-    footprint, ball, keeper = truth.footprint, truth.ball_position, truth.keeper
+    footprint, ball = truth.footprint, truth.ball_position
     eye = np.array([*footprint.transform(view.position[:2]), view.position[2]])
     hiding = Hiding(eye)
-    hiding.add_boxes("self", body)
+    alone, _ = scene_of(replace(truth, keeper=None, others=()), body, "cyan")
+    together, _ = scene_of(truth, body, "cyan")
+    hiding.add_boxes("self", alone.boxes)
+    hiding.add_boxes("opponent", together.boxes.after(len(alone.boxes.sizes)))
     hiding.add_cylinder("ball", ball[:2], field.ball_radius, 2.0 * field.ball_radius)
     for index, post in enumerate(field.goal_posts):
         hiding.add_cylinder(f"post{index}", np.array([post.x, post.y]), post.radius + 0.01, post.height)
     for index, pole in enumerate(field.poles):
         hiding.add_cylinder(f"pole{index}", np.array([pole.x, pole.y]), pole.radius + 0.01, pole.height)
-    if keeper is not None:
-        hiding.add_boxes("opponent", keeper_boxes(keeper, "cyan"))
 
     def seen(points: Array, owner: str, margin: float) -> NDArray[np.bool_]:
         """Return (n,) whether points (n, 3) in map are in the picture and nothing hides them."""
@@ -154,8 +155,8 @@ def things(truth: Truth, body: Boxes, field: Field, view: View) -> dict[str, lis
         near = pole.radius * (eye - foot) / np.linalg.norm(eye[:2] - foot[:2]) * [1, 1, 0]
         axis = foot + near + np.outer([0.0, 0.3, 0.55], [0.0, 0.0, 1.0])
         add("pole", (kind,), foot, bool(seen(axis, f"pole{index}", 15.0).all()))
-    if keeper is not None:
-        here = np.array([keeper.x, keeper.y, 0.0])
+    for opponent in (*truth.figures, *(other.footprint for other in truth.others)):
+        here = np.array([opponent.x, opponent.y, 0.0])
         outline = np.concatenate([here + OPPONENT_REACH * AROUND, here + np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.95]])])
         add("opponent", GROUPS["opponent"], here, bool(seen(outline, "opponent", 0.0).all()))
     for crossing in field.crossings:
