@@ -68,7 +68,8 @@ class Strategy:
             self._acceleration.reset()
             return WalkCommand(context.stamp, context.mode, STILL)
         velocity = self._acceleration.step(context.velocity, math.inf if context.sudden else context.dt)
-        return WalkCommand(context.stamp, WalkMode.WALK, kept_off(velocity, context.bodies, context.parameters))
+        velocity = kept_off(velocity, context.obstacles, context.parameters.keep_off_gain)
+        return WalkCommand(context.stamp, WalkMode.WALK, velocity)
 
     def _head(self) -> HeadCommand:
         context = self._context

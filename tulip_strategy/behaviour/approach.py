@@ -63,17 +63,17 @@ class Approach(Leaf):
         self._side = side_round(target, ball, self._side)
         waypoint = next_waypoint(target, ball, parameters.ball_clearance, self._side, parameters.arc_ahead)
         way_left = math.hypot(*waypoint) + math.dist(waypoint, target)
-        waypoint = self._round_opponents(waypoint)
+        waypoint = self._round_obstacles(waypoint)
         context.walk(towards(waypoint, way_left, aim, way_left > parameters.face_travel_distance, parameters))
         track_ball(context)
         return Status.RUNNING
 
-    def _round_opponents(self, waypoint: Point) -> Point:
-        """Return a waypoint beside the nearest opponent that stands in the way, else the waypoint itself."""
-        clearance = self.context.parameters.opponent_clearance
-        for opponent in sorted(self.context.bodies, key=lambda point: math.hypot(*point)):
-            at_target = math.dist(opponent, waypoint) < clearance
-            if not at_target and distance_to_way(opponent, (0.0, 0.0), waypoint) < clearance:
-                side = side_round(waypoint, opponent, 0)
-                return next_waypoint(waypoint, opponent, clearance, side, self.context.parameters.arc_ahead)
+    def _round_obstacles(self, waypoint: Point) -> Point:
+        """Return a waypoint beside the nearest obstacle that stands in the way, else the waypoint itself."""
+        for obstacle in sorted(self.context.obstacles, key=lambda each: math.hypot(*each.position)):
+            place, clearance = obstacle.position, obstacle.clearance
+            at_target = math.dist(place, waypoint) < clearance
+            if not at_target and distance_to_way(place, (0.0, 0.0), waypoint) < clearance:
+                side = side_round(waypoint, place, 0)
+                return next_waypoint(waypoint, place, clearance, side, self.context.parameters.arc_ahead)
         return waypoint

@@ -7,6 +7,7 @@ from tulip_description.robot import load_robot
 from tulip_motion.gaze import GazePlanner
 from tulip_motion.interface import HeadMode, KickGoal, MotionState, WalkMode
 from tulip_strategy.behaviour.aim import Aim
+from tulip_strategy.behaviour.keep_off import Obstacle
 from tulip_strategy.behaviour.keeper_glance import KeeperGlance
 from tulip_strategy.behaviour.steering import STILL, Velocity
 from tulip_strategy.interface import GameState, UserCommand, UserRequest
@@ -108,6 +109,18 @@ class Context:
     def bodies(self) -> list[Point]:
         """Where opponents stand, in base_footprint [m]."""
         return [(float(each.position[0]), float(each.position[1])) for each in self.opponents]
+
+    @property
+    def obstacles(self) -> list[Obstacle]:
+        """What the robot could walk into: opponents as they are seen, goal posts and poles as the map has them."""
+        p = self.parameters
+        found = [Obstacle(each, p.keep_off, p.opponent_clearance) for each in self.bodies]
+        if self.world is not None:
+            to_footprint = self.world.robot.pose.inverse()
+            for upright in (*self.field.goal_posts, *self.field.poles):
+                place = to_footprint.transform((upright.x, upright.y))
+                found.append(Obstacle(place, p.keep_off_upright, p.upright_clearance))
+        return found
 
     def clear_wish(self) -> None:
         """Forget the last wish: stand and hold the head."""
