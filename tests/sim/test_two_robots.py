@@ -13,6 +13,7 @@ import pytest
 
 from tulip_description.field import load_field
 from tulip_description.planar import Pose2D, wrap_angle
+from tulip_description.posture import standing_posture
 from tulip_description.robot import load_robot
 from tulip_motion.interface import MotionMode, WalkCommand, WalkMode
 from tulip_motion.motion import Motion
@@ -159,15 +160,21 @@ def test_the_other_teams_map_is_turned_by_half_a_circle(world: World) -> None:
     assert poles == {(-pole.x, -pole.y, pole.colours) for pole in load_field().poles}
 
 
-@pytest.mark.parametrize("yaw", [0.0, math.pi / 2.0, math.pi, -math.pi / 2.0])
-def test_vision_finds_the_other_robot_whichever_side_it_shows(yaw: float) -> None:
+@pytest.mark.parametrize("yaw", np.arange(-150.0, 181.0, 30.0))
+def test_vision_finds_the_other_robot_and_its_place_whichever_side_its_bent_legs_show(yaw: float) -> None:
+    """The trunk, not the feet, is below the marker of a robot with bent knees that is seen from the side."""
     robot, lens = load_robot(), head_camera_lens()
-    world = World(replace(APART, others=(Pose2D(0.5, 0.2, yaw),)), WorldParameters.exact(), 1)
+    world = World(replace(APART, others=(Pose2D(0.5, 0.2, math.radians(yaw)),)), WorldParameters.exact(), 1)
     try:
         camera = CameraParameters(team_colour="magenta", keeper_colour="cyan")
         posture = world.truth().joint_positions.copy()
         posture[13] = 0.35  # looks a little down
         truth = replace(world.truth(), joint_positions=posture)
+        bent = standing_posture(robot, hip_height=0.53)
+        other = truth.others[0]
+        base_position = np.array([*other.base_position[:2], bent.base_height])
+        other = replace(other, base_position=base_position, joint_positions=bent.joint_positions)
+        truth = replace(truth, others=(other,))
         picture = CameraRenderer(camera, load_field(), robot, lens).render(truth, np.random.default_rng(1))
         body = Body(robot, "magenta")
         base, footprint = np.eye(4), np.eye(4)
@@ -181,6 +188,8 @@ def test_vision_finds_the_other_robot_whichever_side_it_shows(yaw: float) -> Non
         opponents = [each for each in found if each.kind is FeatureClass.OPPONENT]
         assert len(opponents) == 1
         assert opponents[0].azimuth == pytest.approx(math.atan2(0.2, 2.5), abs=0.1)
+        camera_height = float(camera_in_map[2, 3])
+        assert camera_height / math.tan(-opponents[0].elevation) == pytest.approx(math.hypot(2.5, 0.2), abs=0.3)
     finally:
         world.close()
 
