@@ -1,4 +1,4 @@
-"""Play many trials over seeds and parameter sets, on all cores or on a Ray cluster."""
+"""Play many trials or matches over seeds and parameter sets, on all cores or on a Ray cluster."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ from tulip_sim.perception import PerceptionParameters
 from tulip_sim.scenario import SCENARIOS
 
 EYES = {"camera": None, "degraded": PerceptionParameters(), "ideal": PerceptionParameters.ideal()}
+TRIAL = "trial"
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 JOURNAL = ".journal"  # behind the name of the results file
 
@@ -42,7 +43,9 @@ def main(
         Path | None, typer.Option(help="YAML or JSON file of parameter sets, `set: {node: {name: value}}`.")
     ] = None,
     play: Annotated[str, typer.Option(help=", ".join(PLAYS))] = "trial",
-    scenario: Annotated[str, typer.Option(help=", ".join(SCENARIOS))] = "trial",
+    scenario: Annotated[
+        str | None, typer.Option(help=f"Of a trial, {TRIAL} by default: {', '.join(SCENARIOS)}.", show_default=False)
+    ] = None,
     eyes: Annotated[
         str, typer.Option(help="camera (pictures and vision), or features made up from the truth: degraded or ideal")
     ] = "camera",
@@ -52,16 +55,19 @@ def main(
     """Play; Ctrl-C ends it, and the same command goes on, also after a kill or a power cut."""
     console = Console()
     try:
-        for kind, name, known in (("play", play, PLAYS), ("scenario", scenario, SCENARIOS), ("eyes", eyes, EYES)):
+        begin = scenario or TRIAL
+        for kind, name, known in (("play", play, PLAYS), ("scenario", begin, SCENARIOS), ("eyes", eyes, EYES)):
             if name not in known:
                 raise unknown(kind, name, known)
+        if scenario is not None and not PLAYS[play].has_scenario:
+            raise BadInputError(f"--scenario is {scenario}, but a {play} begins by its own rules; leave it out.")
         if ray is not None and workers is not None:
             raise BadInputError("--workers is for this machine; expected it without --ray.")
         check_ending(results)
         check_writable(results, "Results file")
         base = PLAYS[play].base(EYES[eyes])
         chosen = {DEFAULT: base} if sets is None else read_sets(sets, base, PLAYS[play].change)
-        batch = Batch(play, scenario, chosen, range(first_seed, first_seed + number))
+        batch = Batch(play, begin if PLAYS[play].has_scenario else "", chosen, range(first_seed, first_seed + number))
         with Journal(results.with_name(results.name + JOURNAL), batch) as journal:
             try:
                 run(batch, journal, workers, ray, console)

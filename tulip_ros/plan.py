@@ -134,12 +134,13 @@ def read_yaml(path: Path) -> Any:
         raise BadInputError(f"Parameter file {path} is no valid YAML: {_what_is_wrong(error)}.") from error
 
 
-def as_parameters(content: Any, where: str) -> dict[str, Values]:
+def as_parameters(content: Any, where: str, namespaces: Sequence[str] = ()) -> dict[str, Values]:
     """Return parameters by node.
 
     Args:
         content: As in a parameter file.
         where: That file, for messages.
+        namespaces: Those that are kept before the names of nodes, as in "keeper/strategy"; others are dropped.
 
     Raises:
         BadInputError: if it does not name nodes and values.
@@ -148,14 +149,14 @@ def as_parameters(content: Any, where: str) -> dict[str, Values]:
         raise BadInputError(f"Parameter file {where} holds {type(content).__name__}; expected `node: {{name: value}}`.")
     result: dict[str, Values] = {}
     for key, block in content.items():
-        name = str(key) if key == EVERY_NODE else str(key).split("/")[-1]
+        namespace, _, name = ("", "", EVERY_NODE) if key == EVERY_NODE else str(key).strip("/").rpartition("/")
         if name not in (EVERY_NODE, "driver", *NODES):
             raise unknown(f"node in {where} called", str(key), [*NODES, "driver", EVERY_NODE])
         if isinstance(block, dict) and set(block) == {"ros__parameters"}:
             block = block["ros__parameters"]
         if not isinstance(block, dict):
             raise BadInputError(f"Parameter file {where}: {key} holds {block!r}; expected `name: value` lines.")
-        result[name] = block
+        result[f"{namespace}/{name}" if namespace in namespaces else name] = block
     return result
 
 

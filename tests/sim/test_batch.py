@@ -22,7 +22,7 @@ from typer.testing import CliRunner, Result
 from tulip_ros.errors import BadInputError
 from tulip_sim.batch.jobs import PLAYS, Batch, Job
 from tulip_sim.batch.journal import Journal
-from tulip_sim.batch.parameter_sets import make_settings, read_sets
+from tulip_sim.batch.parameter_sets import make_match_settings, make_settings, read_sets
 from tulip_sim.batch.results import mean, rate, summarize, write_results
 from tulip_sim.bench import batch as bench
 from tulip_sim.lockstep import Settings
@@ -143,6 +143,7 @@ def test_the_same_batch_on_a_ray_cluster(tmp_path: Path) -> None:
 
 
 IDEAL = Settings(perception=PerceptionParameters.ideal())
+MATCH = PLAYS["match"].base(PerceptionParameters.ideal())
 
 
 def test_parameter_sets_address_parameters_as_the_graph_does(tmp_path: Path) -> None:
@@ -167,6 +168,51 @@ def test_parameter_sets_address_parameters_as_the_graph_does(tmp_path: Path) -> 
     assert other.perception is not None
     assert other.perception.latency == 0.5
     assert other.motion == IDEAL.motion
+
+
+def test_sets_of_a_match_change_both_robots_or_one_of_them(tmp_path: Path) -> None:
+    path = tmp_path / "sets.yaml"
+    path.write_text(
+        """
+        duel:
+          keeper/strategy: {forward_speed: 0.2}
+          strategy: {forward_speed: 0.3, standoff: 0.6}
+          driver: {keeper: stand still, rules: {trials: 2, team_numbers: [1, 2]}, world.ball_mass: 0.4}
+          /striker/perception: {quality.latency: 0.5}
+        """
+    )
+    settings = read_sets(path, MATCH, make_match_settings)["duel"]
+    first, second = settings.robots
+    assert (first.strategy.forward_speed, second.strategy.forward_speed) == (0.3, 0.2)
+    assert first.strategy.standoff == second.strategy.standoff == 0.6
+    assert (settings.keeper, settings.striker) == ("stand still", MATCH.striker)
+    assert (settings.rules.trials, settings.rules.team_numbers, settings.world.ball_mass) == (2, (1, 2), 0.4)
+    assert first.perception is not None
+    assert first.perception.latency == 0.5
+    assert second.perception == PerceptionParameters.ideal()
+    path.write_text("a: {striker/driver: {striker: stand still}}")
+    with pytest.raises(BadInputError, match="share one simulator"):
+        read_sets(path, MATCH, make_match_settings)
+
+
+@pytest.mark.sim
+def test_a_batch_of_matches_is_played_to_its_end(tmp_path: Path) -> None:
+    sets = tmp_path / "sets.yaml"
+    rules = "{trials: 2, extra_pairs: 0, initial_time: 1.2, ready_time: 0.2, set_time: 0.2, playing_time: 0.4}"
+    sets.write_text(f"short: {{driver: {{rules: {rules}}}}}")
+    results = tmp_path / "results.csv"
+    options = ["--play", "match", "-n", "2", "--sets", sets, "--eyes", "ideal", "--workers", "1"]
+    played = invoke(results, *options)
+    assert played.exit_code == 0, played.output
+    assert "matches won by magenta" in played.output
+    rows = table(results)
+    assert [(each["seed"], each["trials"]) for each in rows] == [("1", "2"), ("2", "2")]
+    assert all(each["decided_by"] == "draw" for each in rows)
+        ("1", "2", "draw"),
+        ("2", "2", "draw"),
+    ]
+    assert all(float(each["simulated_time"]) > 4.0 for each in rows)
+    assert all(float(each[f"{name}_localization_error"]) < 0.2 for each in rows for name in ("cyan", "magenta"))
 
 
 @pytest.mark.parametrize(
@@ -290,7 +336,8 @@ def test_the_summary_counts_only_what_it_says(tmp_path: Path) -> None:
     [
         (["{folder}/results.txt"], "ends in '.txt'; expected .csv or .parquet"),
         (["{folder}/nowhere/results.csv"], "cannot be written: No such file or directory"),
-        (["{folder}/results.csv", "--play", "chess"], "There is no play 'chess'. Known: trial"),
+        (["{folder}/results.csv", "--play", "chess"], "There is no play 'chess'. Known: "),
+        (["{folder}/results.csv", "--play", "match", "--scenario", "open"], "a match begins by its own rules"),
         (["{folder}/results.csv", "--scenario", "moon"], "There is no scenario 'moon'"),
         (["{folder}/results.csv", "--eyes", "closed"], "There is no eyes 'closed'"),
         (["{folder}/results.csv", "--sets", "{folder}/none.yaml"], "none.yaml cannot be read: No such file"),

@@ -7,10 +7,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from tulip_sim.batch.parameter_sets import make_settings
+from tulip_sim.batch.parameter_sets import make_match_settings, make_settings
 from tulip_sim.lockstep import Settings
 from tulip_sim.match_lockstep import play_lockstep
+from tulip_sim.match_rules import COLOUR_NAMES
+from tulip_sim.match_settings import MatchSettings
 from tulip_sim.perception import PerceptionParameters
+from tulip_sim.play_lockstep_match import play_lockstep_match
+from tulip_sim.referee import Result
+from tulip_sim.robot_stack import RobotSettings
 
 Row = dict[str, Any]
 """Figures of one job by name; text, numbers, truth values or None."""
@@ -28,6 +33,7 @@ class Play:
         rates: Columns of truth values, by the words that the summary has for them.
         means: Columns of numbers, by those words; each with a column of truth values that a row must have set to count,
             or "" for all rows.
+        has_scenario: Whether it begins as one of the scenarios says; else its own rules do.
     """
 
     run: Callable[[int, str, Any], Row]
@@ -35,6 +41,7 @@ class Play:
     change: Callable[[Mapping[str, Mapping[str, Any]], Any], Any]
     rates: Mapping[str, str] = field(default_factory=dict)
     means: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    has_scenario: bool = True
 
 
 @dataclass(frozen=True)
@@ -56,7 +63,7 @@ class Batch:
 
     Attributes:
         play: One of `PLAYS`.
-        scenario: Name of the scenario.
+        scenario: Name of the scenario, or "" for a play without.
         sets: Settings of the play, by the name of the parameter set.
         seeds: That each set plays with.
     """
@@ -99,6 +106,27 @@ def play_trial(seed: int, scenario: str, settings: Settings) -> Row:
     }
 
 
+def play_match(seed: int, scenario: str, settings: MatchSettings) -> Row:
+    """Play one match of two robots."""
+    summary = play_lockstep_match(seed, settings)
+    report, errors = summary.report, summary.localization_errors
+    goals = [trial for trial in report.trials if trial.result == Result.GOAL.value]
+    return {
+        "result": report.verdict,
+        "decided_by": report.decided_by,
+        **{f"{name}_goals": report.score[team] for team, name in enumerate(COLOUR_NAMES)},
+        **{f"{name}_won": report.winner == team for team, name in enumerate(COLOUR_NAMES)},
+        "trials": len(report.trials),
+        "trials_with_goal": len(goals),
+        "time_of_goals": sum(trial.seconds for trial in goals) / len(goals) if goals else None,
+        "falls": summary.falls,
+        "removals": summary.removals,
+        "simulated_time": summary.duration,
+        **{f"{name}_localization_error": errors[team] for team, name in enumerate(COLOUR_NAMES)},
+        "real_time_factor": summary.real_time_factor,
+    }
+
+
 PLAYS: dict[str, Play] = {
     "trial": Play(
         play_trial,
@@ -112,7 +140,23 @@ PLAYS: dict[str, Play] = {
             "heading error [deg]": ("heading_error", ""),
             "real-time factor": ("real_time_factor", ""),
         },
-    )
+    ),
+    "match": Play(
+        play_match,
+        base=lambda perception: MatchSettings(robots=(RobotSettings(perception=perception),) * 2),
+        change=make_match_settings,
+        rates={f"matches won by {name}": f"{name}_won" for name in COLOUR_NAMES},
+        means={
+            **{f"goals of {name}": (f"{name}_goals", "") for name in COLOUR_NAMES},
+            "trials": ("trials", ""),
+            "time to goal, mean of a match [s]": ("time_of_goals", ""),
+            "falls": ("falls", ""),
+            "removals": ("removals", ""),
+            **{f"localization error of {name} [m]": (f"{name}_localization_error", "") for name in COLOUR_NAMES},
+            "real-time factor": ("real_time_factor", ""),
+        },
+        has_scenario=False,
+    ),
 }
 """What a batch can play, by name."""
 

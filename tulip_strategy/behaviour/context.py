@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tulip_description.field import Field
+from tulip_description.field import Field, GoalPost, Pole
 from tulip_description.robot import load_robot
 from tulip_motion.gaze import GazePlanner
 from tulip_motion.interface import HeadMode, KickGoal, MotionState, WalkMode
@@ -117,9 +117,9 @@ class Context:
         found = [Obstacle(each, p.keep_off, p.opponent_clearance) for each in self.bodies]
         if self.world is not None:
             to_footprint = self.world.robot.pose.inverse()
-            for upright in (*self.field.goal_posts, *self.field.poles):
-                place = to_footprint.transform((upright.x, upright.y))
-                found.append(Obstacle(place, p.keep_off_upright, p.upright_clearance))
+            uprights: tuple[GoalPost | Pole, ...] = (*self.field.goal_posts, *self.field.poles)
+            places = (to_footprint.transform((each.x, each.y)) for each in uprights)
+            found += [Obstacle(place, p.keep_off_upright, p.upright_clearance) for place in places]
         return found
 
     def clear_wish(self) -> None:
