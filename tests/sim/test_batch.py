@@ -208,9 +208,6 @@ def test_a_batch_of_matches_is_played_to_its_end(tmp_path: Path) -> None:
     rows = table(results)
     assert [(each["seed"], each["trials"]) for each in rows] == [("1", "2"), ("2", "2")]
     assert all(each["decided_by"] == "draw" for each in rows)
-        ("1", "2", "draw"),
-        ("2", "2", "draw"),
-    ]
     assert all(float(each["simulated_time"]) > 4.0 for each in rows)
     assert all(float(each[f"{name}_localization_error"]) < 0.2 for each in rows for name in ("cyan", "magenta"))
 
