@@ -36,7 +36,7 @@ class StrategyParameters(GazeParameters):
     upright_clearance: float = 0.5  # [m] the same for a goal post or a pole
 
     # Other robots, posts and poles.
-    keep_off: float = 0.6  # [m] between the middles of two robots, at which none walks towards the other any more
+    keep_off: float = 0.7  # [m] between the middles of two robots, at which none walks towards the other any more
     keep_off_upright: float = 0.4  # [m] the same for a goal post or a pole: the reach of a toe's corner (0.3), a margin
     keep_off_gain: float = 0.8  # [1/s] speed towards something per distance that is left
     kick_clear_distance: float = 0.72  # [m] nobody nearer in a kick's direction: the toe swings 0.5 m ahead

@@ -15,6 +15,8 @@ from tulip_vision.opponent_markers import Marker
 from tulip_vision.segmentation import Colour, Segmentation, belongs
 from tulip_vision.view import Array, View, fan_of
 
+NEVER_LOWER = -1e-3
+"""[rad] elevation of a place that is too far away to stand on the carpet."""
 UPRIGHT_RADIUS = 0.15
 """[m] from the axis of a post or pole up to which what touches the carpet is its foot: the net's and a shadow's too."""
 CARPET = Colour.GREEN | Colour.WHITE
@@ -22,6 +24,12 @@ LEAST_HIDDEN = 4
 """[px] of carpet that a body hides, in height and in width: a foot 9 m away is twice that wide."""
 MOST_DOWN = 480.0
 """[px] from a marker downwards."""
+
+FIRST_LOOK, CLOSE_LOOK = (9, 3.0), (13, 2.0)
+"""Number of cuts, and the distance between their samples [px]: the first look only says where to look closer."""
+SPREADS = {cuts: np.linspace(-1.0, 1.0, cuts) for cuts, _ in (FIRST_LOOK, CLOSE_LOOK)}
+MOST_LOOKS = 3
+"""Closer ones."""
 
 
 def hides_carpet(marker: Marker, reach: float, segmentation: Segmentation) -> bool:
@@ -41,7 +49,48 @@ def hides_carpet(marker: Marker, reach: float, segmentation: Segmentation) -> bo
     return int(np.count_nonzero(hidden >= LEAST_HIDDEN)) >= LEAST_HIDDEN
 
 
-def contact(
+def foot_below(
+    marker: Marker,
+    half: float,
+    half_width: float,
+    least: float,
+    uprights: Sequence[Feature],
+    segmentation: Segmentation,
+    view: View,
+    pixel: float,
+) -> float | None:
+    """Return the elevation at which the lowest point of the body below a marker meets the carpet [rad], below 0.
+
+    NaN means that the lowest point is not in view; None that no body stands on the carpet there.
+
+    Args:
+        marker: Where to start.
+        half: Half the angle of the first look [rad].
+        half_width: Of a body [m].
+        least: Half the angle of a closer look at least [rad].
+        uprights: Goal posts and poles.
+        segmentation: Of the picture.
+        view: Of the picture.
+        pixel: Angle of one pixel [rad].
+    """
+    low = _contact(marker, half, FIRST_LOOK, uprights, segmentation, view, pixel)
+    if low is None or math.isnan(low):
+        return low
+    if low > NEVER_LOWER:
+        return None
+    # Closer looks, with the width that a body has at the range found before; nearer than thought, it is wider.
+    for _ in range(MOST_LOOKS):
+        distance = view.height / math.tan(-low)
+        again = _contact(marker, max(half_width / distance, least), CLOSE_LOOK, uprights, segmentation, view, pixel)
+        if again is None or again > NEVER_LOWER:
+            break
+        low = again
+        if math.isnan(low) or view.height / math.tan(-low) > 0.9 * distance:
+            break
+    return low
+
+
+def _contact(
     marker: Marker,
     half: float,
     look: tuple[int, float],
@@ -64,7 +113,7 @@ def contact(
         view: Of the picture.
         pixel: Angle of one pixel [rad].
     """
-    azimuths = np.linspace(marker.azimuth - half, marker.azimuth + half, look[0])
+    azimuths = marker.azimuth + half * SPREADS[look[0]]
     step = look[1] * pixel
     bottom = view.lowest_elevation - 3.0 * step
     elevations = np.arange(0.5 * (marker.low + marker.high), bottom, -step)[: int(MOST_DOWN / look[1])]
@@ -88,12 +137,13 @@ def contact(
     below_marker = hides & (np.arange(len(elevations))[:, None] < above) & ~carpet[0] & seen[0]
     below_marker &= np.count_nonzero(below_marker, axis=0) >= 2
     body = _grown(below_marker, hides)
-    lowest = len(elevations) - 1 - body[::-1].argmax(axis=0)
+    ends_at = len(elevations) - 1 - body[::-1].argmax(axis=0)
     has = body.any(axis=0)
-    goes_on = has & ~np.vstack([seen[1:], np.zeros_like(seen[:1])])[lowest, np.arange(len(azimuths))]
+    goes_on = has & ~seen[np.minimum(ends_at + 1, len(elevations) - 1), np.arange(len(azimuths))]
+    goes_on |= has & (ends_at == len(elevations) - 1)
     if np.count_nonzero(goes_on) >= 2:
         return nan  # some cuts leave the picture on the body: its lowest point is not seen
-    ends = np.minimum(lowest + 1, len(elevations) - 1)
+    ends = np.minimum(ends_at + 1, len(elevations) - 1)
     standing = has & ~_on_upright(azimuths, elevations[ends], uprights, view, pixel)
     if np.count_nonzero(standing) < 2:
         return None
@@ -182,8 +232,8 @@ def middle_of(
     rows = complete & body.any(axis=1) & (body.mean(axis=1) < 0.8)
     if np.count_nonzero(rows) < 2:
         return marker.azimuth, bool(inside.all())
-    left = np.array([azimuths[row].max() for row in body[rows]])
-    right = np.array([azimuths[row].min() for row in body[rows]])
+    chosen = body[rows]
+    left, right = azimuths[len(azimuths) - 1 - chosen[:, ::-1].argmax(axis=1)], azimuths[chosen.argmax(axis=1)]
     middle = float(np.median(0.5 * (left + right)))
     # Legs and marker agree on most bodies; where they do not, the truth is between them.
     return 0.5 * (middle + marker.azimuth), bool(inside.all())

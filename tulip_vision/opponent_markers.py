@@ -9,7 +9,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_vision.segmentation import Colour, Segmentation, belongs
 from tulip_vision.view import View
+
+EDGE = 2
+"""[px] row of the picture that is looked at for what its upper edge cuts."""
+LEAST_CUT = 8
+"""[px] across: a leg 3 m away is that wide."""
+NO_BODY = Colour.GREEN | Colour.WHITE | Colour.ORANGE | Colour.YELLOW | Colour.BLUE
 
 
 @dataclass(frozen=True)
@@ -58,6 +65,22 @@ def markers_of(found: list[tuple[NDArray[np.int32], float]], view: View) -> list
         Marker(one_left, one_right, lowest, highest, area, (u, v), in_part)
         for (one_left, one_right, lowest, highest, (u, v), in_part), (_, area) in zip(columns, found, strict=True)
     ]
+
+
+def cut_bodies(segmentation: Segmentation, view: View) -> list[Marker]:
+    """Return where the picture's upper edge cuts something that is no carpet: markers of no area, as wide as that."""
+    inside = segmentation.on_carpet[EDGE] != 0
+    if not inside.any():
+        return []
+    bare = inside & ~belongs(segmentation.classes[EDGE], NO_BODY) & (segmentation.own_body[EDGE] == 0)
+    changes = np.flatnonzero(np.diff(np.concatenate([[False], bare, [False]]).view(np.int8)))
+    found = []
+    for start, stop in changes.reshape(-1, 2).tolist():
+        if stop - start >= LEAST_CUT:
+            azimuths, elevations = view.angles_at(np.array([[start, EDGE], [stop - 1, EDGE]]))
+            low, pixel = float(elevations.min()), (0.5 * (start + stop), float(EDGE))
+            found.append(Marker(float(azimuths[0]), float(azimuths[1]), low, low, 0.0, pixel, cut=True))
+    return found
 
 
 def joined(marker: Marker, markers: list[Marker], reach: float) -> Marker:

@@ -1,4 +1,8 @@
-"""Opponents: a marker in the other team's colour on a body that stands on the carpet."""
+"""Opponents: a marker in the other team's colour on a body that stands on the carpet.
+
+Of one that is near while the camera looks down, only the legs are in the picture: whatever stands on the carpet and is
+neither post nor pole counts, too, if the picture's upper edge cuts it.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +15,8 @@ import numpy as np
 
 from tulip_vision.features import Feature, FeatureClass
 from tulip_vision.findings import Findings, Refusal
-from tulip_vision.opponent_body import carpet_beside, contact, hides_carpet, middle_of, painted_share
-from tulip_vision.opponent_markers import Marker, angle_between, is_compact, joined, markers_of
+from tulip_vision.opponent_body import carpet_beside, foot_below, hides_carpet, middle_of, painted_share
+from tulip_vision.opponent_markers import Marker, angle_between, cut_bodies, is_compact, joined, markers_of
 from tulip_vision.patches import patches
 from tulip_vision.segmentation import Colour, Segmentation
 from tulip_vision.view import View, direction_of
@@ -29,11 +33,10 @@ NEAREST = 0.4
 """[m] along the ground to an opponent's nearest marker: closer, the robots touch."""
 MIDDLE_SPREAD = 0.08
 """[m] standard deviation of a body's middle across the line of sight."""
+LEAST_OF_LEGS = 0.25
+"""[m] height above the ground at which the picture's upper edge cuts legs at least; lower things are no robots."""
 PARTLY_SEEN = 2.5
 """How many times less sure the place of an opponent is that the picture's edge or the own body hides in part."""
-FIRST_LOOK, CLOSE_LOOK = (9, 3.0), (13, 2.0)
-"""Number of cuts, and the distance between their samples [px]: the first look only says where to look closer."""
-MOST_LOOKS = 3
 WIDTH_OF_CUT = 0.2
 """[rad] half the width of a look below a marker that the edge of the picture cuts: of a body 1.5 m away."""
 
@@ -103,33 +106,66 @@ def find_opponents(
     top = view.first_row(above / math.hypot(above, NEAREST))
     found = patches(segmentation.mask(colour, top), parameters.least_area, MOST_CANDIDATES, (0, top))
     markers = markers_of([(points, area) for points, area in found if is_compact(points, area)], view)
-    opponents: list[Feature] = []
-    reach: list[float] = []  # [rad] half the angle that each opponent fills
-    refusals: list[Refusal] = []
+    found_so_far = _Found(view, parameters)
     for marker in markers:
-        known = zip(opponents, reach, strict=True)
-        if any(angle_between(marker.azimuth, opponent.azimuth) < angle for opponent, angle in known):
-            continue  # another marker of an opponent already found
-        result = _examine(marker, markers, uprights, segmentation, view, parameters)
-        if isinstance(result, Feature) and any(_same(result, other, view, parameters) for other in opponents):
+        if not found_so_far.covers(marker):
+            found_so_far.take(marker, _examine(marker, markers, uprights, segmentation, view, parameters))
+    legs = [
+        (body, _examine_legs(body, uprights, segmentation, view, parameters))
+        for body in cut_bodies(segmentation, view)
+        if not found_so_far.covers(body)
+    ]
+    for body, result in sorted(legs, key=lambda pair: _lowest(pair[1])):  # arms seem to stand behind the legs
+        if not found_so_far.covers(body):
+            found_so_far.take(body, result)
+    return found_so_far.findings()
+
+
+class _Found:
+    """The opponents of one picture so far."""
+
+    def __init__(self, view: View, parameters: OpponentParameters) -> None:
+        self._view, self._parameters = view, parameters
+        self._opponents: list[Feature] = []
+        self._reach: list[float] = []  # [rad] half the angle that each fills
+        self._refusals: list[Refusal] = []
+
+    def covers(self, marker: Marker) -> bool:
+        """Return whether a marker is another one of an opponent already found."""
+        known = zip(self._opponents, self._reach, strict=True)
+        return any(angle_between(marker.azimuth, opponent.azimuth) < angle for opponent, angle in known)
+
+    def take(self, marker: Marker, result: Feature | str) -> None:
+        """Take what the examination of a marker gave."""
+        if isinstance(result, Feature) and any(self._same(result, other) for other in self._opponents):
             result = "part of an opponent already found"
         if isinstance(result, str):
-            refusals.append(Refusal(FeatureClass.OPPONENT, marker.pixel, result))
-            continue
-        opponents.append(result)
+            self._refusals.append(Refusal(FeatureClass.OPPONENT, marker.pixel, result))
+            return
+        self._opponents.append(result)
         if math.isnan(result.elevation):
-            reach.append(NEAR_REACH)
+            self._reach.append(NEAR_REACH)
         else:
-            reach.append(1.2 * parameters.half_width * math.tan(-result.elevation) / view.height)
-    return Findings(tuple(opponents), tuple(refusals))
+            half_width = self._parameters.half_width
+            self._reach.append(1.2 * half_width * math.tan(-result.elevation) / self._view.height)
+
+    def findings(self) -> Findings:
+        """Return all opponents and refusals."""
+        return Findings(tuple(self._opponents), tuple(self._refusals))
+
+    def _same(self, one: Feature, other: Feature) -> bool:
+        """Return whether two opponents would stand in one another."""
+        if math.isnan(one.elevation) or math.isnan(other.elevation):
+            return angle_between(one.azimuth, other.azimuth) < NEAR_REACH
+        ground = self._view.ground(np.stack([direction_of(each.azimuth, each.elevation) for each in (one, other)]))
+        return float(np.linalg.norm(ground[0] - ground[1])) < 2.0 * self._parameters.half_width
 
 
-def _same(one: Feature, other: Feature, view: View, parameters: OpponentParameters) -> bool:
-    """Return whether two opponents would stand in one another."""
-    if math.isnan(one.elevation) or math.isnan(other.elevation):
-        return angle_between(one.azimuth, other.azimuth) < NEAR_REACH
-    ground = view.ground(np.stack([direction_of(each.azimuth, each.elevation) for each in (one, other)]))
-    return float(np.linalg.norm(ground[0] - ground[1])) < 2.0 * parameters.half_width
+def _lowest(result: Feature | str) -> float:
+    """Return what sorts the nearest first: those whose feet are below the picture, then by elevation."""
+    if isinstance(result, str):
+        return math.inf
+    return -math.inf if math.isnan(result.elevation) else result.elevation
 
 
 def _examine(
@@ -154,26 +190,14 @@ def _examine(
     half = max(0.6 * (group.left - group.right), width, least) + 2.0 * pixel
     if not hides_carpet(marker, 1.5 * min(half, NEAR_REACH) / pixel, segmentation):
         return "no body that stands on the carpet below the marker"
-    low = contact(group, min(half, NEAR_REACH), FIRST_LOOK, uprights, segmentation, view, pixel)
+    low = foot_below(group, min(half, NEAR_REACH), parameters.half_width, least, uprights, segmentation, view, pixel)
     if low is None:
         return "no body that stands on the carpet below the marker"
     if math.isnan(low):
         return _without_feet(marker, markers, view, parameters)
-    if low > -1e-3 or view.height / math.tan(-low) > parameters.farthest:
-        return "stands beyond the carpet"
-    # Further looks, with the width that a body has at the range found before; nearer than thought, it is wider.
-    for _ in range(MOST_LOOKS):
-        distance = view.height / math.tan(-low)
-        half = max(parameters.half_width / distance, least)
-        again = contact(group, half, CLOSE_LOOK, uprights, segmentation, view, pixel)
-        if again is None:
-            break
-        if math.isnan(again):
-            return _without_feet(marker, markers, view, parameters)
-        low = again
-        if view.height / math.tan(-low) > 0.9 * distance:
-            break
     distance = view.height / math.tan(-low)
+    if distance > parameters.farthest:
+        return "stands beyond the carpet"
     marker_height = view.height + distance * math.tan(0.5 * (marker.low + marker.high))
     if not parameters.lowest_marker <= marker_height <= parameters.highest_marker:
         return f"marker {marker_height:.2f} m above the ground"
@@ -188,6 +212,47 @@ def _examine(
         < low + 3 * pixel
     ):
         return "the carpet ends beside it, too: it stands behind the carpet"
+    confidence = min(1.0, 0.6 + 0.4 * marker.area / (20.0 * parameters.least_area))
+    return _standing(marker, low, confidence, segmentation, view, parameters)
+
+
+def _examine_legs(
+    body: Marker,
+    uprights: Sequence[Feature],
+    segmentation: Segmentation,
+    view: View,
+    parameters: OpponentParameters,
+) -> Feature | str:
+    """Return who stands below the place where the picture's upper edge cuts a body: its marker is above the picture."""
+    pixel = view.angle_per_pixel(direction_of(body.azimuth, body.low))
+    half = 0.5 * (body.left - body.right) + 2.0 * pixel
+    if half > NEAR_REACH:
+        return "no leg is so wide"
+    low = foot_below(body, half, parameters.half_width, WIDTH_OF_CUT, uprights, segmentation, view, pixel)
+    if low is None:
+        return "nothing that stands on the carpet"
+    if math.isnan(low):
+        spread, _ = view.spreads(direction_of(body.azimuth, body.low), 3.0)
+        return Feature(FeatureClass.OPPONENT, body.azimuth, nan, math.hypot(spread, half), nan, confidence=0.4)
+    distance = view.height / math.tan(-low)
+    height = view.height + distance * math.tan(body.low)
+    if not LEAST_OF_LEGS <= height <= parameters.highest_marker:
+        return f"cut {height:.2f} m above the ground"
+    if painted_share(body, low, segmentation, view) > 0.25:
+        return "yellow or blue: a post or a pole"
+    return _standing(body, low, 0.5, segmentation, view, parameters)
+
+
+def _standing(
+    marker: Marker,
+    low: float,
+    confidence: float,
+    segmentation: Segmentation,
+    view: View,
+    parameters: OpponentParameters,
+) -> Feature:
+    """Return an opponent whose lowest point is seen, at elevation `low` [rad]."""
+    distance = view.height / math.tan(-low)
     azimuth, whole = middle_of(marker, low, distance, parameters.half_width, segmentation, view)
     elevation = -math.atan2(view.height, distance + parameters.depth)
     spread_azimuth, spread_elevation = view.spreads(direction_of(azimuth, elevation), 2.0)
@@ -202,7 +267,7 @@ def _examine(
         elevation,
         math.hypot(spread_azimuth, across),
         math.hypot(spread_elevation, along),
-        confidence=min(1.0, 0.6 + 0.4 * marker.area / (20.0 * parameters.least_area)),
+        confidence=confidence,
     )
 
 
