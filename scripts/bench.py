@@ -22,6 +22,7 @@ from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unkn
 from tulip_sim.bench import (
     ball,
     batch,
+    challenges,
     clik,
     control,
     head,
@@ -41,7 +42,7 @@ from tulip_sim.bench import (
 from tulip_sim.bench.runner import Row, run, save, write_results
 
 MODULES = (
-    *(strategy, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress),
+    *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress),
     *(vision, localization, ball, head, latency),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tulip_sim.bench import ilc, kick, push, strategy, stress, walk
+from tulip_sim.bench import challenges, ilc, kick, push, strategy, stress, walk
 from tulip_sim.bench.runner import Bench, Row, run, save, write_results
 
 BENCHES = (strategy.BENCH, walk.BENCH, push.BENCH, kick.BENCH, ilc.BENCH, stress.BENCH)
@@ -258,3 +258,25 @@ def test_a_short_walk_gives_an_error_for_each_step(monkeypatch: pytest.MonkeyPat
     assert len(row[ilc.TRUE]) == len(row[ilc.MEASURED]) == 6
     assert 4.0 < row[ilc.TRUE][3] < 12.0  # [mrad] before learning acts
     assert row["greatest learned torque [N m]"] > 0.5
+
+
+def test_the_challenges_table_tells_goals_and_misses() -> None:
+    course, throw_in = challenges.COURSE, challenges.THROW_IN
+    rows = [
+        {"part": course, "seed": 1, "outcome": "goal", "time [s]": 40.0, "touches": 9, "falls": 0},
+        {"part": course, "seed": 2, "outcome": "fallen", "time [s]": 20.0, "touches": 3, "falls": 1},
+        {"part": throw_in, "seed": 1, "time [s]": 20.0, "way [m]": 2.9, "miss [m]": 0.3, "falls": 0},
+        {"part": throw_in, "seed": 2, "time [s]": 60.0, "way [m]": 3.2, "miss [m]": None, "falls": 0},
+    ]
+    text = "\n".join(challenges.summarize(rows))
+    assert "goals: 1 of 2, after 40 s (median); other ends: fallen (seed 2)" in text
+    assert "falls: 1" in text
+    assert "kicked: 1 of 2; distance from the target at rest: median 0.30 m" in text
+
+
+@pytest.mark.sim
+def test_a_throw_in_is_kicked_and_measured() -> None:
+    row = challenges.measure(challenges.THROW_IN, 2)
+    assert row["miss [m]"] is not None
+    assert row["miss [m]"] < 0.5 * row["way [m]"]
+    assert row["falls"] == 0
