@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import MISSING, fields, replace
 
 import numpy as np
 import pytest
@@ -11,13 +11,13 @@ from walk_simulation import CAMERA, Simulation
 
 from tulip_description.planar import Pose2D
 from tulip_motion.messages import odometry_to_message
-from tulip_msgs.msg import Feature as FeatureMessage
 from tulip_msgs.msg import Features as FeaturesMessage
 from tulip_ros import topics
 from tulip_ros.run import session
-from tulip_ros.time import from_message, header, stamp_of
+from tulip_ros.time import from_message, stamp_of
 from tulip_strategy.messages import world_state_from_message
-from tulip_vision.features import Features
+from tulip_vision.features import Feature, FeatureClass
+from tulip_vision.messages import features_to_message
 from tulip_worldmodel.messages import (
     features_from_message,
     map_to_odom_message,
@@ -29,15 +29,6 @@ from tulip_worldmodel.world_state import WorldState
 from tulip_worldmodel.worldmodel_node import WorldModelNode
 
 pytestmark = pytest.mark.ros
-
-
-def features_message(features: Features) -> FeaturesMessage:
-    return FeaturesMessage(
-        header=header(features.stamp, "base_footprint"),
-        camera_position=features.camera_position,
-        view=features.view,
-        features=[FeatureMessage(**{**vars(feature), "kind": int(feature.kind)}) for feature in features.features],
-    )
 
 
 def simulated(seconds: float = 2.0) -> tuple[list[OdometryMessage | FeaturesMessage], WorldState]:
@@ -59,7 +50,7 @@ def simulated(seconds: float = 2.0) -> tuple[list[OdometryMessage | FeaturesMess
         messages.append(odometry_to_message(moment.odometry))
         if moment.features is not None:
             world.add_features(moment.features)
-            messages.append(features_message(moment.features))
+            messages.append(features_to_message(moment.features))
     return messages, world.state(moment.stamp)
 
 
@@ -78,7 +69,15 @@ def test_features_survive_the_way_through_a_message() -> None:
     simulation = Simulation(lambda time, pose: (0.0, 0.0, 0.0), 0.5, Pose2D(), np.random.default_rng(0))
     pictures = [moment.features for moment in simulation.run() if moment.features is not None]
     assert sum(len(picture.features) for picture in pictures) > 5
-    assert all(same(features_from_message(features_message(picture)), picture) for picture in pictures)
+    assert all(same(features_from_message(features_to_message(picture)), picture) for picture in pictures)
+    of_all_fields = Feature(FeatureClass.GOAL, 0.1, -0.2, 0.01, 0.02, 0.5, 0.3, -0.4, 0.05, side=-1)
+    values = [getattr(of_all_fields, field.name) for field in fields(Feature)]
+    assert len(set(values)) == len(values)  # none that another could be taken for
+    assert all(
+        field.default is MISSING or value != field.default for field, value in zip(fields(Feature), values, strict=True)
+    )
+    picture = replace(pictures[0], features=(of_all_fields,))
+    assert same(features_from_message(features_to_message(picture)), picture)
 
 
 def test_world_state_survives_the_way_through_a_message_with_and_without_ball() -> None:
