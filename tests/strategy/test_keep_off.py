@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from kinematic_bench import KinematicTrial
+from kinematic_bench import KinematicTrial, seen_object
 
 from tulip_description.field import load_field
 from tulip_description.planar import Pose2D
 from tulip_motion.interface import WalkCommand
+from tulip_strategy.behaviour.approach import Approach
 from tulip_strategy.behaviour.context import Context
 from tulip_strategy.behaviour.keep_off import Obstacle, in_kicks_way, kept_off
 from tulip_strategy.parameters import StrategyParameters
@@ -59,11 +60,11 @@ def test_posts_and_poles_of_the_map_are_obstacles_wherever_the_robot_is() -> Non
 
 
 class Watched(KinematicTrial):
-    """A trial from beside the own goal that notes how near the robot comes to the post between it and the ball."""
+    """A trial near the own goal that notes how near the robot comes to a post of it."""
 
-    def __init__(self, parameters: StrategyParameters) -> None:
+    def __init__(self, parameters: StrategyParameters, robot: Pose2D, ball: tuple[float, float]) -> None:
         super().__init__(3, parameters=parameters)
-        self.robot, self.ball = Pose2D(-4.25, 2.0, -1.6), np.array([-4.1, 0.5])
+        self.robot, self.ball = robot, np.array(ball)
         self.post = self.field.own_goal.posts[0]
         self.nearest = math.inf
 
@@ -73,13 +74,30 @@ class Watched(KinematicTrial):
 
 
 def test_the_way_to_a_ball_behind_a_goal_post_leads_round_the_post() -> None:
-    careless = Watched(replace(PARAMETERS, keep_off_upright=0.01, upright_clearance=0.01))
+    start = Pose2D(-4.25, 2.0, -1.6), (-4.1, 0.5)
+    careless = Watched(replace(PARAMETERS, keep_off_upright=0.01, upright_clearance=0.01), *start)
     careless.run(60.0)
     assert careless.nearest < 0.2
-    careful = Watched(PARAMETERS)
+    careful = Watched(PARAMETERS, *start)
     careful.run(60.0)
     assert careful.nearest > 0.3
     assert careful.touches > 0
+
+
+def test_where_the_shorter_way_round_the_ball_has_no_room_beside_a_post_the_other_one_is_taken() -> None:
+    """The ball lies 0.54 m from a post of the own goal, and the robot comes from the post's side."""
+    robot, ball = Pose2D(-3.3, 1.5, math.pi), (-4.09, 1.71)
+    turns = {}
+    for name, parameters in {"no post": replace(PARAMETERS, keep_off_upright=0.01), "post": PARAMETERS}.items():
+        context = Context(parameters, load_field())
+        seen = seen_object(robot, ball, (0.0, 0.0))
+        context.see(WorldState(10**9, RobotEstimate(robot, np.eye(3) * 1e-4, robot), seen, ()))
+        context.aim.direction = math.radians(169.0)  # to the opponent's goal, behind the robot
+        approach = Approach(context)
+        approach.initialise()
+        approach.update()
+        turns[name] = context.velocity[2]
+    assert turns["post"] < 0.0 < turns["no post"]
 
 
 def test_a_kick_is_held_back_where_the_leg_would_meet_somebody() -> None:

@@ -9,7 +9,7 @@ from py_trees.common import Status
 from tulip_strategy.behaviour.base import Leaf
 from tulip_strategy.behaviour.context import Context, Point
 from tulip_strategy.behaviour.gaze import track_ball
-from tulip_strategy.behaviour.path import distance_to_way, next_waypoint, side_round
+from tulip_strategy.behaviour.path import arc_round, distance_to_way, next_waypoint, side_round
 from tulip_strategy.behaviour.steering import from_aim_frame, in_aim_frame, towards
 
 
@@ -61,12 +61,24 @@ class Approach(Leaf):
         back = from_aim_frame(-parameters.standoff, 0.0, aim)
         target = (ball[0] + back[0], ball[1] + back[1])
         self._side = side_round(target, ball, self._side)
-        waypoint = next_waypoint(target, ball, parameters.ball_clearance, self._side, parameters.arc_ahead)
+        side = self._free_side(target, ball)
+        waypoint = next_waypoint(target, ball, parameters.ball_clearance, side, parameters.arc_ahead)
         way_left = math.hypot(*waypoint) + math.dist(waypoint, target)
         waypoint = self._round_obstacles(waypoint)
         context.walk(towards(waypoint, way_left, aim, way_left > parameters.face_travel_distance, parameters))
         track_ball(context)
         return Status.RUNNING
+
+    def _free_side(self, target: Point, ball: Point) -> int:
+        """Return the side of the shorter way round the ball, or the other one if something stands in only that way."""
+        clearance = self.context.parameters.ball_clearance
+        obstacles = self.context.obstacles
+
+        def is_free(side: int) -> bool:
+            places = arc_round(target, ball, clearance, side)
+            return all(math.dist(each.position, place) > each.keep_off for each in obstacles for place in places)
+
+        return self._side if is_free(self._side) or not is_free(-self._side) else -self._side
 
     def _round_obstacles(self, waypoint: Point) -> Point:
         """Return a waypoint beside the nearest obstacle that stands in the way, else the waypoint itself."""

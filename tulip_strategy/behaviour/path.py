@@ -7,6 +7,7 @@ import math
 from tulip_description.planar import wrap_angle
 
 Point = tuple[float, float]
+ARC_STEP = 0.2  # [rad] between places on a circle
 
 
 def distance_to_way(point: Point, start: Point, end: Point) -> float:
@@ -34,6 +35,23 @@ def side_round(target: Point, obstacle: Point, previous: int) -> int:
     if previous != 0 and abs(difference) > math.radians(140.0):
         return previous
     return 1 if difference >= 0.0 else -1
+
+
+def arc_round(target: Point, obstacle: Point, clearance: float, side: int) -> list[Point]:
+    """Return places on the circle round an obstacle, from the robot's side to the target's, seen from the robot.
+
+    Args:
+        target: Where to go [m].
+        obstacle: What to go round [m].
+        clearance: Radius of the circle [m].
+        side: +1 anticlockwise round the obstacle, -1 clockwise.
+    """
+    start = math.atan2(-obstacle[1], -obstacle[0])
+    end = math.atan2(target[1] - obstacle[1], target[0] - obstacle[0])
+    way = (side * (end - start)) % (2.0 * math.pi)
+    count = math.ceil(way / ARC_STEP)
+    angles = (start + side * way * number / max(count, 1) for number in range(count + 1))
+    return [(obstacle[0] + clearance * math.cos(each), obstacle[1] + clearance * math.sin(each)) for each in angles]
 
 
 def next_waypoint(target: Point, obstacle: Point, clearance: float, side: int, arc_ahead: float) -> Point:
