@@ -118,7 +118,7 @@ def _draw(drawn: NDArray[np.uint8], feature: Feature, view: View) -> None:
     u, v = round(float(pixel[0])), round(float(pixel[1]))
     which = {1: "left ", -1: "right "}.get(feature.side, "")
     text = f"{which}{_name(feature.kind)} {feature.confidence:.2f}"
-    if feature.kind == FeatureClass.BALL:
+    if feature.kind == FeatureClass.BALL and not math.isnan(feature.angular_radius):
         direction = direction_of(feature.azimuth, feature.elevation)
         cv2.circle(
             drawn, (u, v), round(feature.angular_radius / view.angle_per_pixel(direction)), colour, 1, cv2.LINE_AA

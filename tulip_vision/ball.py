@@ -24,6 +24,8 @@ from tulip_vision.view import Array, Mask, View, angles
 
 MOST_CANDIDATES = 10
 """The largest orange patches are looked at; a crowd in orange shirts must not cost time without bound."""
+WELL_SEEN = 0.7
+"""Share of the outline that has to be seen for the size to count, and for the place to be as sure as a pixel is."""
 BESIDE = 3
 """[px] from the own body: an outline nearer than that is the body's, not the ball's."""
 
@@ -149,7 +151,7 @@ def _examine(
 
     azimuth, elevation = angles(centre[None])
     # A ball of which only part of the outline is seen is less sure in place: its fit extrapolates.
-    doubt = 1.0 if seen > 0.7 else 1.0 + 3.0 * (0.7 - seen)
+    doubt = 1.0 if seen > WELL_SEEN else 1.0 + 3.0 * (WELL_SEEN - seen)
     spread_azimuth, spread_elevation = view.spreads(centre, doubt)
     fits = math.exp(-((math.log(radius / fitting) / math.log(parameters.size_tolerance)) ** 2))
     return Feature(
@@ -159,7 +161,8 @@ def _examine(
         spread_azimuth,
         spread_elevation,
         confidence=min(1.0, fill) * fits * (0.5 + 0.5 * share),
-        angular_radius=radius,
+        # One that is hidden in part looks small in picture after picture, and what is cut was fitted to its place.
+        angular_radius=radius if seen > WELL_SEEN and free.all() else math.nan,
     )
 
 

@@ -78,6 +78,8 @@ def test_ball_half_behind_a_foot_is_found_with_a_larger_spread() -> None:
     assert hidden.azimuth == pytest.approx(whole.azimuth, abs=math.radians(0.3))
     assert hidden.azimuth_spread > whole.azimuth_spread
     assert hidden.confidence < whole.confidence
+    assert math.isnan(hidden.angular_radius)  # it would look small, and so far away, in picture after picture
+    assert whole.angular_radius > 0.0
 
 
 @pytest.mark.parametrize("shown", [0.25, 0.5, 0.8])
@@ -93,6 +95,7 @@ def test_ball_half_hidden_by_the_own_chest_is_found_where_it_lies(shown: float, 
     (azimuth,), (elevation,) = angles(ray[None] / np.linalg.norm(ray))
     assert found[0].azimuth * math.cos(elevation) == pytest.approx(azimuth * math.cos(elevation), abs=0.003)
     assert found[0].elevation == pytest.approx(elevation, abs=0.003)
+    assert math.isnan(found[0].angular_radius)
 
 
 def test_what_the_own_chest_hides_half_must_be_as_big_as_a_ball_on_the_ground() -> None:

@@ -92,7 +92,11 @@ def see(name: str, lens: Lens, pose: Array, parameters: VisionParameters) -> tup
         if feature.kind == FeatureClass.BALL:
             direction = direction_of(feature.azimuth, feature.elevation)
             u, v = vision.last.view.pixels_of_directions(direction[None])[0].tolist()
-            balls.append(Found(u, v, feature.angular_radius / vision.last.view.angle_per_pixel(direction)))
+            size = feature.angular_radius
+            if math.isnan(size):  # seen in part: as large as a ball at its place
+                ball = parameters.ball.radius
+                size = math.asin(min(1.0, ball * math.sin(-feature.elevation) / (vision.last.view.height - ball)))
+            balls.append(Found(u, v, size / vision.last.view.angle_per_pixel(direction)))
     return vision, balls
 
 
