@@ -49,6 +49,7 @@ BALL_DISTANCE = (0.5, 3.0)  # [m] from the robot
 HEADING_SPREAD = math.radians(45.0)  # to either side of the direction to the goal
 LINE_MARGIN = 0.3  # [m] the ball starts this far inside the outer lines at least
 THROW_IN_INSIDE = 0.1  # [m] of the touchline, where the ball is set down
+THROW_IN_ROOM = 1.0  # [m] from a pole: there has to be room for a robot behind the ball
 COURSE = (-1.0, 0.8, 2.6)  # [m] x of the obstacles in map
 KEEPER_AHEAD = 0.3  # [m] in front of the goal line
 KEEPER_HALF_WIDTH = 0.3  # [m] of the figure
@@ -92,6 +93,8 @@ def throw_in(rng: np.random.Generator, field: Field) -> Scenario:
     """Return the technical challenge: the ball beside a touchline, the robot somewhere in the field, nobody else."""
     side = 1.0 if rng.random() < 0.5 else -1.0
     ball = (rng.uniform(-2.0, 2.0), side * (0.5 * field.width - THROW_IN_INSIDE))
+    while any(math.dist(ball, (pole.x, pole.y)) < THROW_IN_ROOM for pole in field.poles):
+        ball = (rng.uniform(-2.0, 2.0), ball[1])
     robot = Pose2D(ball[0] + rng.uniform(-1.5, 1.5), side * rng.uniform(0.0, 1.0), side * math.pi / 2.0)
     return Scenario(robot, ball, poles=bool(field.poles))
 

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_vision.body_growth import lowest_of_body
 from tulip_vision.features import Feature
 from tulip_vision.opponent_markers import Marker
 from tulip_vision.segmentation import Colour, Segmentation, belongs
@@ -121,44 +122,18 @@ def _contact(
         return None  # the marker touches the lower edge of the picture
     pixels = view.pixels_of_directions(fan_of(azimuths, elevations))
     images = (segmentation.classes, segmentation.on_carpet, segmentation.own_body)
-    (classes, on_carpet, own_body), inside = view.sample_all(images, pixels)
+    cut, inside = view.sample_all(images, pixels)
     shape = (len(elevations), len(azimuths))
-    own = (own_body != 0).reshape(shape)
-    # A ball at the feet is no part of the body.
-    carpet = (belongs(classes, CARPET | Colour.ORANGE) & (on_carpet != 0)).reshape(shape)
-    seen = inside.reshape(shape) & ~own
-    # The carpet begins where three samples in a row are carpet; a single one is noise. What the own body hides, and
-    # all below it, tells nothing.
-    begins = carpet[:-2] & carpet[1:-1] & carpet[2:] & ~np.logical_or.accumulate(own, axis=0)[:-2]
-    above = np.where(begins.any(axis=0), begins.argmax(axis=0), len(elevations))
-    # A body hides carpet: above its foot the picture shows something else inside the carpet's outline.
-    painted = belongs(classes, Colour.YELLOW | Colour.BLUE)
-    hides = ~carpet & (on_carpet != 0).reshape(shape) & ~painted.reshape(shape) & seen
-    below_marker = hides & (np.arange(len(elevations))[:, None] < above) & ~carpet[0] & seen[0]
-    below_marker &= np.count_nonzero(below_marker, axis=0) >= 2
-    body = _grown(below_marker, hides)
-    ends_at = len(elevations) - 1 - body[::-1].argmax(axis=0)
-    has = body.any(axis=0)
-    goes_on = has & ~seen[np.minimum(ends_at + 1, len(elevations) - 1), np.arange(len(azimuths))]
-    goes_on |= has & (ends_at == len(elevations) - 1)
+    no_body, painted = int(CARPET | Colour.ORANGE), int(Colour.YELLOW | Colour.BLUE)
+    lowest, goes_on = lowest_of_body(*(each.reshape(shape) for each in (*cut, inside)), no_body, painted)
     if np.count_nonzero(goes_on) >= 2:
         return nan  # some cuts leave the picture on the body: its lowest point is not seen
-    ends = np.minimum(ends_at + 1, len(elevations) - 1)
-    standing = has & ~_on_upright(azimuths, elevations[ends], uprights, view, pixel)
+    ends = np.minimum(lowest + 1, len(elevations) - 1)
+    standing = (lowest >= 0) & ~_on_upright(azimuths, elevations[ends], uprights, view, pixel)
     if np.count_nonzero(standing) < 2:
         return None
     rows = np.sort(ends[standing])
     return float(elevations[rows[-2]]) + 0.25 * step  # the second lowest: one cut may follow a ball or a shadow
-
-
-def _grown(seeds: NDArray[np.bool_], mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the connected parts of a mask that hold a seed: bent legs are not straight below a marker."""
-    _, labels = cv2.connectedComponents(mask.view(np.uint8), connectivity=8, ltype=cv2.CV_16U)
-    held = np.zeros(int(labels.max()) + 1, dtype=np.bool_)
-    held[labels[seeds]] = True
-    held[0] = False
-    grown: NDArray[np.bool_] = held[labels]
-    return grown
 
 
 def carpet_beside(

@@ -222,6 +222,12 @@ class Vision:
             ends = [(round(u * width), round(v * height)) for u, v in (start, end)]
             cv2.line(picture, ends[0], ends[1], (230, 230, 230), max(width // 80, 2), cv2.LINE_AA)
         cv2.circle(picture, (width // 4, 3 * height // 4), width // 20, (20, 100, 230), -1, cv2.LINE_AA)
+        left, right, top = round(0.7 * width), round(0.76 * width), round(0.3 * height)
+        cv2.rectangle(
+            picture, (left, top), (right, round(0.6 * height)), (60, 60, 60), -1
+        )  # an opponent of either team
+        cv2.rectangle(picture, (left, top), ((left + right) // 2, round(0.36 * height)), (200, 200, 40), -1)
+        cv2.rectangle(picture, ((left + right) // 2, top), (right, round(0.36 * height)), (150, 40, 200), -1)
         down, ahead = math.sin(0.5), math.cos(0.5)
         pose = np.array(
             [[0.0, -down, ahead, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -ahead, -down, 1.1], [0.0, 0.0, 0.0, 1.0]]

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from test_segmentation import CARPET, looking_down
 
+from tulip_vision.body_growth import lowest_of_body
 from tulip_vision.lens import head_camera_lens
+from tulip_vision.line_growth import grow_lines
 from tulip_vision.pipeline import Stage, Vision, VisionParameters, check_stages, stages
+from tulip_vision.pixel_loops import nearest_pixels
 from tulip_vision.view import SpreadParameters, View
 
 
@@ -98,6 +101,8 @@ def test_rehearsing_leaves_no_trace() -> None:
     fresh, rehearsed = (Vision(VisionParameters(), head_camera_lens()) for _ in range(2))
     rehearsed.rehearse()
     assert rehearsed.last is None
+    loops = (lowest_of_body, grow_lines, nearest_pixels)
+    assert all(loop.signatures for loop in loops)  # compiled, so that no real picture has to wait
     first, second = (vision.process(picture, 5, POSE) for vision in (fresh, rehearsed))
     assert len(first.features) > 0
     assert repr(first.features) == repr(second.features)
