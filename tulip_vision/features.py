@@ -51,7 +51,8 @@ class Feature:
         azimuth_spread, elevation_spread: Standard deviations [rad].
         confidence: 0 to 1.
         end_azimuth, end_elevation: Other end of a LINE, FIELD_BORDER or GOAL [rad], else NaN.
-        angular_radius: Half the angle that a BALL fills [rad]; NaN where too little of its outline is seen, else too.
+        angular_radius: Half the angle that a BALL fills [rad]; NaN where too little of its outline is seen,
+            and for all other kinds.
         side: 1 for a GOAL_POST that is the left one of its goal as the camera sees it, -1 for the right one, else 0.
     """
 

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from tulip_vision.body_growth import lowest_of_body
 from tulip_vision.features import Feature
-from tulip_vision.opponent_markers import Marker
+from tulip_vision.opponent_markers import NO_BODY, Marker
 from tulip_vision.segmentation import Colour, Segmentation, belongs
 from tulip_vision.view import Array, View, fan_of
 
-NEVER_LOWER = -1e-3
-"""[rad] elevation of a place that is too far away to stand on the carpet."""
+HORIZON = -1e-3
+"""[rad] elevation above which nothing stands on the carpet: it would be a kilometre away."""
 UPRIGHT_RADIUS = 0.15
 """[m] from the axis of a post or pole up to which what touches the carpet is its foot: the net's and a shadow's too."""
 CARPET = Colour.GREEN | Colour.WHITE
@@ -44,7 +44,7 @@ def hides_carpet(marker: Marker, reach: float, segmentation: Segmentation) -> bo
     u, v = marker.pixel
     step = 1 + int(reach) // 40  # of what is large and close, some of the pixels tell enough
     part = slice(max(int(v), 0), None, step), slice(max(int(u - reach), 0), max(int(u + reach) + 2, 0), step)
-    bare = segmentation.classes[part] & np.uint8(CARPET | Colour.ORANGE | Colour.YELLOW | Colour.BLUE) == 0
+    bare = ~belongs(segmentation.classes[part], NO_BODY)
     bare &= segmentation.on_carpet[part] != 0
     hidden = cv2.reduce(bare.view(np.uint8), 0, cv2.REDUCE_SUM, dtype=cv2.CV_32S)
     return int(np.count_nonzero(hidden >= LEAST_HIDDEN)) >= LEAST_HIDDEN
@@ -77,13 +77,13 @@ def foot_below(
     low = _contact(marker, half, FIRST_LOOK, uprights, segmentation, view, pixel)
     if low is None or math.isnan(low):
         return low
-    if low > NEVER_LOWER:
+    if low > HORIZON:
         return None
     # Closer looks, with the width that a body has at the range found before; nearer than thought, it is wider.
     for _ in range(MOST_LOOKS):
         distance = view.height / math.tan(-low)
         again = _contact(marker, max(half_width / distance, least), CLOSE_LOOK, uprights, segmentation, view, pixel)
-        if again is None or again > NEVER_LOWER:
+        if again is None or again > HORIZON:
             break
         low = again
         if math.isnan(low) or view.height / math.tan(-low) > 0.9 * distance:

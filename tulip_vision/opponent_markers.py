@@ -17,6 +17,7 @@ EDGE = 2
 LEAST_CUT = 8
 """[px] across: a leg 3 m away is that wide."""
 NO_BODY = Colour.GREEN | Colour.WHITE | Colour.ORANGE | Colour.YELLOW | Colour.BLUE
+"""Carpet and lines, balls, posts and poles: what belongs to no robot."""
 
 
 @dataclass(frozen=True)
