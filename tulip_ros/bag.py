@@ -15,6 +15,7 @@ from mcap.writer import CompressionType, Writer
 
 from tulip_ros import schemas
 from tulip_ros.errors import BadInputError
+from tulip_ros.log_file import Log, LoggedTopic
 from tulip_ros.topics import Quality
 
 CHUNK = 512 * 1024  # [B] compressed and written at one time; what a crash loses at most
@@ -71,6 +72,7 @@ class Bag:
         self._writer = Writer(self._stream, chunk_size=CHUNK, compression=CompressionType.ZSTD)
         self._writer.start(profile=Profile.ROS2, library="tulip_ros")
         self._schemas: dict[str, int] = {}
+        self._copied: dict[str, tuple[str, str]] = {}
         self._span = _Span()
         self._flushed = time.monotonic()
 
@@ -108,6 +110,41 @@ class Bag:
             name, MessageEncoding.CDR, self._schemas[type_name], {"offered_qos_profiles": profiles}
         )
         self._span.channels[name] = _Channel(number, type_name, profiles)
+
+    def copy_topic(self, topic: LoggedTopic) -> None:
+        """Declare a topic as another recording holds it; the same again changes nothing.
+
+        Raises:
+            ValueError: if it was declared with another type or definition.
+        """
+        known = self._span.channels.get(topic.name)
+        if known is not None:
+            if self._copied.get(topic.name) != (topic.type_name, topic.definition):
+                raise ValueError(f"topic {topic.name} has different types; expected one")
+            return
+        key = f"{topic.type_name}\n{topic.definition}"
+        if key not in self._schemas:
+            self._schemas[key] = self._writer.register_schema(
+                topic.type_name, SchemaEncoding.ROS2, topic.definition.encode()
+            )
+        notes = {"offered_qos_profiles": topic.quality} if topic.quality else {}
+        number = self._writer.register_channel(topic.name, MessageEncoding.CDR, self._schemas[key], notes)
+        self._span.channels[topic.name] = _Channel(number, topic.type_name, topic.quality)
+        self._copied[topic.name] = (topic.type_name, topic.definition)
+
+    def copy_notes(self, log: Log, label: str = "") -> None:
+        """Take over what the recorder of another recording noted and attached.
+
+        Args:
+            log: The other one.
+            label: Put before each name, so that notes of several recordings do not mix.
+        """
+        for name, values in log.metadata.items():
+            self._writer.add_metadata(f"{label}{name}", values)
+        for each in log.attachments():
+            self._writer.add_attachment(
+                each.create_time, each.log_time, f"{label}{each.name}", each.media_type, each.data
+            )
 
     def write(self, name: str, data: bytes, stamp: int) -> None:
         """Write one message.
@@ -170,7 +207,7 @@ class Bag:
                     "name": name,
                     "type": channel.type_name,
                     "serialization_format": "cdr",
-                    "offered_qos_profiles": yaml.safe_load(channel.quality),
+                    "offered_qos_profiles": yaml.safe_load(channel.quality) or [],
                     "type_description_hash": "",
                 },
                 "message_count": channel.messages,

@@ -42,12 +42,14 @@ class LoggedTopic:
         type_name: As in nav_msgs/msg/Odometry.
         definition: Of the type and all types in it, in text (ros2msg).
         messages: How many there are.
+        quality: Quality of service that its publishers offered, as rosbag2 notes it in YAML; "" where not noted.
     """
 
     name: str
     type_name: str
     definition: str
     messages: int
+    quality: str = ""
 
 
 @dataclass(frozen=True)
@@ -117,16 +119,19 @@ class Log:
         """Topics by their names, in the order of these."""
         counts: dict[str, int] = {}
         found: dict[str, Schema] = {}
+        qualities: dict[str, str] = {}
         for _, summary in self._readers:
             statistics = summary.statistics
             for number, channel in summary.channels.items():
                 if channel.message_encoding not in ENCODINGS or channel.schema_id not in summary.schemas:
                     continue  # not written by ROS 2: nothing that could be decoded
                 found.setdefault(channel.topic, summary.schemas[channel.schema_id])
+                qualities.setdefault(channel.topic, channel.metadata.get("offered_qos_profiles", ""))
                 here = 0 if statistics is None else statistics.channel_message_counts.get(number, 0)
                 counts[channel.topic] = counts.get(channel.topic, 0) + here
         return {
-            name: LoggedTopic(name, found[name].name, found[name].data.decode(), counts[name]) for name in sorted(found)
+            name: LoggedTopic(name, found[name].name, found[name].data.decode(), counts[name], qualities[name])
+            for name in sorted(found)
         }
 
     @cached_property
