@@ -23,6 +23,9 @@ from tulip_ros.errors import BadInputError
 
 MAGIC = b"\x89MCAP0\r\n"
 ENCODINGS = ("cdr",)
+REPEATED = "repeated"
+"""Note in a file that continues a recording: of which topics it begins with messages of the file before, and the
+sequence numbers of the first and the last of them, as in "3 3"."""
 
 
 class DamagedLogError(BadInputError):
@@ -120,7 +123,7 @@ class Log:
         counts: dict[str, int] = {}
         found: dict[str, Schema] = {}
         qualities: dict[str, str] = {}
-        for _, summary in self._readers:
+        for file, (_, summary) in enumerate(self._readers):
             statistics = summary.statistics
             for number, channel in summary.channels.items():
                 if channel.message_encoding not in ENCODINGS or channel.schema_id not in summary.schemas:
@@ -128,7 +131,8 @@ class Log:
                 found.setdefault(channel.topic, summary.schemas[channel.schema_id])
                 qualities.setdefault(channel.topic, channel.metadata.get("offered_qos_profiles", ""))
                 here = 0 if statistics is None else statistics.channel_message_counts.get(number, 0)
-                counts[channel.topic] = counts.get(channel.topic, 0) + here
+                first, last = self._repeated[file].get(channel.topic, (0, -1))
+                counts[channel.topic] = counts.get(channel.topic, 0) + max(0, here - (last + 1 - first))
         return {
             name: LoggedTopic(name, found[name].name, found[name].data.decode(), counts[name], qualities[name])
             for name in sorted(found)
@@ -147,12 +151,17 @@ class Log:
     @cached_property
     def metadata(self) -> dict[str, dict[str, str]]:
         """What the recorder noted, by the name of the note."""
-        return {entry.name: dict(entry.metadata) for reader, _ in self._readers for entry in reader.iter_metadata()}
+        entries = [entry for reader, _ in self._readers for entry in reader.iter_metadata()]
+        return {entry.name: dict(entry.metadata) for entry in entries if entry.name != REPEATED}
 
     def attachments(self) -> Iterator[Attachment]:
-        """Yield the files that the recorder put in."""
+        """Yield the files that the recorder put in; what a later file repeats comes once."""
+        seen: set[tuple[str, bytes]] = set()
         for reader, _ in self._readers:
-            yield from reader.iter_attachments()
+            for each in reader.iter_attachments():
+                if (each.name, each.data) not in seen:
+                    seen.add((each.name, each.data))
+                    yield each
 
     def records(
         self, names: Collection[str] | None = None, start: int | None = None, end: int | None = None
@@ -168,9 +177,12 @@ class Log:
             DamagedLogError: if the file turns out to be damaged on the way.
         """
         wanted = self.topics if names is None else {name: self.topics[name] for name in names if name in self.topics}
-        for file, (reader, _) in zip(self.files, self._readers, strict=True):
+        for number, (file, (reader, _)) in enumerate(zip(self.files, self._readers, strict=True)):
+            repeated = self._repeated[number]
             try:
                 for _, channel, message in reader.iter_messages(list(wanted), starting_at=start, ending_before=end):
+                    if channel.topic in repeated and message.sequence <= repeated[channel.topic][1]:
+                        continue  # the file before had it
                     yield Record(wanted[channel.topic], message.log_time, message.sequence, message.data)
             except (McapError, ValueError, KeyError, EOFError) as error:
                 raise DamagedLogError(file, f"is damaged ({error})") from error
@@ -192,6 +204,16 @@ class Log:
             raise BadInputError(
                 f"Message {record.sequence} of topic {topic.name} in {self.path} is no {topic.type_name}: {error}"
             ) from error
+
+    @cached_property
+    def _repeated(self) -> list[dict[str, tuple[int, int]]]:
+        """Numbers of the first and the last message that each file repeats from the one before, by topic."""
+        found: list[dict[str, tuple[int, int]]] = []
+        for reader, _ in self._readers:
+            notes = [each.metadata for each in reader.iter_metadata() if each.name == REPEATED and found]
+            words = {topic: str(numbers).split() for note in notes for topic, numbers in note.items()}
+            found.append({topic: (int(each[0]), int(each[-1])) for topic, each in words.items()})
+        return found if len(found) > 1 else [{}]
 
     def _open_file(self, file: Path) -> tuple[SeekingReader, Summary]:
         try:
