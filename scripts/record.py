@@ -31,9 +31,7 @@ def main(
         str, typer.Option(help=f"The cameras' pictures: {', '.join(PICTURES)}. Raw ones take 14 MB a second each.")
     ] = "compressed",
     split_size: Annotated[float, typer.Option(help="MB after which the next file is begun; 0 for one file.")] = 0.0,
-    split_time: Annotated[
-        float, typer.Option(help="Seconds after which the next file is begun; 0: never.")
-    ] = 0.0,
+    split_time: Annotated[float, typer.Option(help="Seconds after which the next file is begun; 0: never.")] = 0.0,
     namespace: Annotated[str, typer.Option(help="Namespace of the robot, as in 'striker'.")] = "",
 ) -> None:
     """Record all topics, or those that match."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -17,12 +18,15 @@ from mcap.records import Attachment, Schema
 from mcap.summary import Summary
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import deserialize_message
+from zstandard import ZstdError
 
 from tulip_ros import schemas
 from tulip_ros.errors import BadInputError
 
 MAGIC = b"\x89MCAP0\r\n"
 ENCODINGS = ("cdr",)
+DAMAGES = (McapError, ZstdError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, struct.error)
+"""What the reader raises on meeting damaged bytes."""
 REPEATED = "repeated"
 """Note in a file that continues a recording: of which topics it begins with messages of the file before, and the
 sequence numbers of the first and the last of them, as in "3 3"."""
@@ -184,7 +188,7 @@ class Log:
                     if channel.topic in repeated and message.sequence <= repeated[channel.topic][1]:
                         continue  # the file before had it
                     yield Record(wanted[channel.topic], message.log_time, message.sequence, message.data)
-            except (McapError, ValueError, KeyError, EOFError) as error:
+            except DAMAGES as error:
                 raise DamagedLogError(file, f"is damaged ({error})") from error
 
     def decode(self, record: Record) -> Any:
@@ -228,7 +232,7 @@ class Log:
             summary = reader.get_summary()
         except OSError as error:
             raise BadInputError(f"Recording {file} cannot be read: {error.strerror or error}.") from error
-        except (McapError, ValueError, EOFError, StopIteration) as error:
+        except (*DAMAGES, StopIteration) as error:
             raise DamagedLogError(file, "was not ended properly, or is cut") from error
         if summary is None or summary.statistics is None:
             raise DamagedLogError(file, "has no index")

@@ -6,7 +6,7 @@ import os
 import struct
 import zlib
 from array import array
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import zstandard
@@ -29,6 +29,8 @@ from mcap.records import (
 from mcap.well_known import Profile
 
 MAGIC = b"\x89MCAP0\r\n"
+LIBRARY = "tulip_ros"
+"""Names the program in files that it writes, whose messages are numbered from 0 on."""
 LEVEL = 1  # of zstd: half the time of level 3 for 2 % more bytes
 MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 MESSAGE_FIXED = MESSAGE.size - 9  # [B] of a message beside its data
@@ -84,7 +86,7 @@ class McapFile:
     A record that does not fit on the disk any more is taken back, so the file ends with a whole record at any time.
     """
 
-    def __init__(self, path: Path, library: str = "tulip_ros") -> None:
+    def __init__(self, path: Path, library: str = LIBRARY) -> None:
         """Begin the file.
 
         Raises:
@@ -112,6 +114,17 @@ class McapFile:
     def closed(self) -> bool:
         """Whether no more can be written."""
         return self._stream.closed
+
+    def add_definitions(self, records: Sequence[Schema | Channel]) -> None:
+        """Write schemas or channels, and list them in the index.
+
+        Raises:
+            OSError: if they cannot be written.
+        """
+        self._append(*map(encode, records))
+        for record in records:
+            known = self.schemas if isinstance(record, Schema) else self.channels
+            known[record.id] = record
 
     def add_metadata(self, name: str, data: Mapping[str, str]) -> None:
         """Write names and values.

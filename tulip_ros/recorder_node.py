@@ -23,9 +23,7 @@ from tulip_ros.run import ComponentNode, run
 from tulip_ros.topics import Quality
 
 LOOK = 0.5  # [s] between two looks for new topics and nodes, and at the disk
-COLLECT = (
-    0.02  # [s] between two times that waiting messages are taken: one waking for many is cheap
-)
+COLLECT = 0.02  # [s] between two times that waiting messages are taken: one waking for many is cheap
 WAITING = 200  # messages of one topic that wait while the recorder is busy: 0.8 s at 250 Hz
 HIDDEN = re.compile(r"(^|/)_|^/parameter_events$")
 PICTURES = {

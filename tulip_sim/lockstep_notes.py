@@ -71,10 +71,6 @@ def _attach_robot(
 def _attach_driver(
     bag: Notebook, name: str, seed: int, world: WorldParameters, robot: RobotSettings, others: dict[str, Any]
 ) -> None:
-    values: dict[str, Any] = {
-        "seed": seed,
-        "camera": robot.perception is None,
-        "world": world,
-        "pictures": robot.camera,
-    }
+    values: dict[str, Any] = {"seed": seed, "camera": robot.perception is None}
+    values.update(world=world, pictures=robot.camera)
     log_notes.attach_settings(bag, name, **values, **others)
