@@ -24,6 +24,7 @@ from tulip_ros import schemas
 from tulip_ros.errors import BadInputError
 
 MAGIC = b"\x89MCAP0\r\n"
+SHORTEST = 2 * len(MAGIC) + 29  # [B] with its end
 ENCODINGS = ("cdr",)
 DAMAGES = (McapError, ZstdError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, struct.error)
 """What the reader raises on meeting damaged bytes."""
@@ -228,6 +229,8 @@ class Log:
                 raise BadInputError(f"Recording {file} is empty.")
             if begin != MAGIC:
                 raise BadInputError(f"{file} is no MCAP file; expected a recording of `record.py` or `match.py`.")
+            if file.stat().st_size < SHORTEST:
+                raise DamagedLogError(file, "is cut")
             reader = SeekingReader(stream, validate_crcs=True)
             summary = reader.get_summary()
         except OSError as error:

@@ -45,10 +45,10 @@ def summarize(rows: list[Row]) -> list[str]:
 
 def _matches(rows: list[Row]) -> list[str]:
     lines = [
-        f"A graph with camera is recorded for {log_match.WATCHED:.0f} s of play: all topics, pictures as JPEG. Asked for:"
-        f" {SHARE:.0%} of a core in real time, nothing lost, 10 minutes in {SIZE:.0f} MB (extrapolated from that time)."
-        " The middle column tells the core's share at real time: CPU seconds a simulated second, which counts more"
-        " than it should where the simulation is slower than real time, as some of the work comes by the wall clock.",
+        f"A graph with camera is recorded for {log_match.WATCHED:.0f} s of play: all topics, pictures as JPEG. Asked"
+        f" for: {SHARE:.0%} of a core in real time, nothing lost, 10 minutes in {SIZE:.0f} MB (extrapolated from that"
+        " time). CPU by simulated time is the core's share at real time; it counts more than it should"
+        " where the simulation is slower than real time, as some of the work comes by the wall clock.",
         "",
         "| robots | real-time factor | share of a core | CPU by simulated time | messages | lost"
         " | one picture | 10 minutes | of it pictures |",

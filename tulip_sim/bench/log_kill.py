@@ -1,7 +1,7 @@
 """The recorder is killed at a random moment, again and again: what is in the file afterwards?
 
 A publisher sends numbered messages as a match does: four topics at 250 Hz, pictures as JPEG at 15 Hz. An independent
-subscriber (rclpy, not raw, in this process) notes each message and when it came.
+subscriber (rclpy, not raw, in this process) notes each message, whose stamp tells by the same clock when it was sent.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from rclpy.serialization import deserialize_message
 from tulip_ros import topics, transport
 from tulip_ros.recovery import recover
 from tulip_ros.run import ComponentNode, session
+from tulip_ros.time import stamp_of
 from tulip_ros.topics import Topic
 from tulip_sim.bench.runner import Row
 
@@ -47,13 +48,13 @@ with session(lambda: ComponentNode("sender"), []) as (node, spin):
         spin(0.02)
     spin(0.5)
     rng, begin, tick = random.Random(1), time.monotonic(), 0
-    senders[5].publish(topics.GAME_STATE.message(version=7))
+    senders[5].publish(topics.GAME_STATE.message(header=header(time.time_ns()), version=7))
     while True:
         tick += 1
         for topic, sender in zip(TOPICS[:4], senders):
-            sender.publish(topic.message(header=header(tick)))
+            sender.publish(topic.message(header=header(time.time_ns())))
         if tick % 16 == 0:
-            picture = topics.CAMERA_COMPRESSED.message(header=header(tick), format="jpeg")
+            picture = topics.CAMERA_COMPRESSED.message(header=header(time.time_ns()), format="jpeg")
             picture.data = array.array("B", rng.randbytes(40_000))
             senders[4].publish(picture)
         time.sleep(max(0.0, begin + tick * 0.004 - time.monotonic()))
@@ -66,13 +67,13 @@ class Witness(ComponentNode):
     def __init__(self) -> None:
         """Connect."""
         super().__init__("witness")
-        self.seen: dict[str, list[tuple[float, Any]]] = {}
+        self.seen: dict[str, list[tuple[int, Any]]] = {}
         for topic in TOPICS:
             self.listen(topic, self._noting(topic), depth=1000)
 
     def _noting(self, topic: Topic) -> Callable[[Any], None]:
         entries = self.seen.setdefault(f"/{topic.name}", [])
-        return lambda message: entries.append((time.monotonic(), message))
+        return lambda message: entries.append((stamp_of(message), message))
 
 
 def measure(number: int) -> Row:
@@ -99,7 +100,7 @@ def measure(number: int) -> Row:
                 end = time.monotonic() + after
                 while time.monotonic() < end:
                     spin(0.02)
-                killed = time.monotonic()
+                killed = time.time_ns()
                 recorder.send_signal(signal.SIGKILL)
                 recorder.wait()
                 end = time.monotonic() + 0.3
@@ -115,7 +116,7 @@ def measure(number: int) -> Row:
         return {"part": "kill", "number": number, "after [s]": round(after, 3), **_compare(result.output, seen, killed)}
 
 
-def _compare(output: Path, seen: dict[str, list[tuple[float, Any]]], killed: float) -> Row:
+def _compare(output: Path, seen: dict[str, list[tuple[int, Any]]], killed: int) -> Row:
     """Compare what rosbags reads with what was sent."""
     from rosbags.highlevel import AnyReader
 
@@ -134,7 +135,7 @@ def _compare(output: Path, seen: dict[str, list[tuple[float, Any]]], killed: flo
             first_missing = min(first_missing, entries[len(saved)][0])
     return {
         "saved": sum(map(len, read.values())),
-        "sent before": sum(moment < killed for entries in seen.values() for moment, _ in entries),
-        "lost [s]": round(killed - first_missing, 3),
+        "sent before": sum(sent < killed for entries in seen.values() for sent, _ in entries),
+        "lost [s]": round((killed - first_missing) * 1e-9, 3),
         "equal": equal,
     }

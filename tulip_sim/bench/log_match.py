@@ -70,7 +70,7 @@ def measure(robots: int, seed: int) -> Row:
 def _wait(
     watcher: TrialWatcher | MatchWatcher, spin: Spin, launcher: Launcher, until: float
 ) -> tuple[int, float, float]:
-    """Wait for a simulated time [s] or the end; return the time [ns], and the recorder's CPU and wall-clock time [s]."""
+    """Wait for a simulated time [s] or the end; return it [ns], the recorder's CPU and wall-clock time [s]."""
     while watcher.stamp < until * 1e9 and not _has_ended(watcher):
         spin(0.05)
         launcher.poll()
