@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 
 class LostMessages:
     """Follows the numbers of one topic's messages.
@@ -14,27 +16,30 @@ class LostMessages:
     def __init__(self) -> None:
         self.lost = 0
         """How many are missing so far."""
-        self._last: list[int] = []  # number of each publisher's last message
+        self._last: list[int] = []  # number of each publisher's last message, the one heard last at the end
 
-    def see(self, number: int, publishers: int) -> int:
+    def see(self, number: int, publishers: Callable[[], int]) -> int:
         """Take a message's number; return how many are missing since the one before it.
 
         Args:
             number: That its publisher gave it.
-            publishers: How many there are now.
+            publishers: Tells how many there are now; only asked when a number does not follow another one.
         """
         last = self._last
         if number - 1 in last:
-            last[last.index(number - 1)] = number
+            last.remove(number - 1)
+            last.append(number)
             return 0
+        known = max(1, publishers())
         before = [each for each in last if each < number]
-        if not before or len(last) < publishers:
-            if len(last) >= max(1, publishers):
+        if not before or len(last) < known:
+            if len(last) >= known:
                 last.pop(0)  # of a publisher that is gone, or was started again
             last.append(number)
             return 0
         nearest = max(before)
-        last[last.index(nearest)] = number
+        last.remove(nearest)
+        last.append(number)
         missing = number - nearest - 1
         self.lost += missing
         return missing

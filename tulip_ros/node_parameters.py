@@ -10,7 +10,7 @@ from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 
-PATIENCE = 20  # looks that a node has to answer; then it is asked no more
+PATIENCE = 240  # looks, two minutes, that a node has to start and to answer; then it is asked no more
 
 Told = Callable[[str, dict[str, Any]], None]
 """Is told a node's full name, as in /striker/vision, and its parameters by name."""

@@ -106,7 +106,6 @@ class _Input:
     message_class: type[Any]
     subscription: Any
     numbers: LostMessages = field(default_factory=LostMessages)
-    publishers: int = 1
 
     def take(self) -> Iterable[tuple[int, int, _Input, bytes, int]]:
         """Yield what came in since the last time: when, when it was sent [ns since 1970], from here, data, number."""
@@ -227,7 +226,7 @@ class RecorderNode(ComponentNode):
         for _, sent, source, data, number in messages:
             if source.quality.latched:
                 self._latched[source.name] = (source, data, sent)
-            missing = source.numbers.see(number, source.publishers)
+            missing = source.numbers.see(number, source.subscription.get_publisher_count)
             if missing:
                 self.lost[source.name] = self.lost.get(source.name, 0) + missing
                 self.health.count("lost messages", f"{missing} messages of {source.name} did not arrive", missing)
@@ -259,8 +258,6 @@ class RecorderNode(ComponentNode):
         for name, types in self.get_topic_names_and_types():
             if name not in self.inputs and len(types) == 1 and "/msg/" in types[0]:
                 self.subscribe(name, types[0], *self.offered(name))
-        for each in self.inputs.values():
-            each.publishers = self.count_publishers(each.name)
         self._asker.look()
         if self.bag is None:
             return

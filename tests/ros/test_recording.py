@@ -137,11 +137,20 @@ def test_lockstep_notes_are_parameter_files_that_the_programs_read(tmp_path: Pat
 
 def test_missing_messages_are_counted_by_their_numbers():
     numbers = LostMessages()
-    assert [numbers.see(each, 1) for each in (5, 6, 7, 10, 11)] == [0, 0, 0, 2, 0]
-    assert numbers.see(1, 1) == 0  # the publisher was started again
-    assert numbers.see(3, 1) == 1 and numbers.lost == 3
+
+    def one() -> int:
+        return 1
+
+    assert [numbers.see(each, one) for each in (5, 6, 7, 10, 11)] == [0, 0, 0, 2, 0]
+    assert numbers.see(1, one) == 0  # the publisher was started again
+    assert numbers.see(3, one) == 1 and numbers.lost == 3
     two = LostMessages()
-    assert [two.see(each, 2) for each in (1, 100, 2, 101, 102, 3, 105, 5)] == [0, 0, 0, 0, 0, 0, 2, 1]
+    assert [two.see(each, lambda: 2) for each in (1, 100, 2, 101, 102, 3, 105, 5)] == [0, 0, 0, 0, 0, 0, 2, 1]
+    several = LostMessages()
+    heard = [each for number in range(1, 50) for each in (number, 1000 + number)]
+    assert sum(several.see(each, lambda: 2) for each in heard) == 0
+    assert several.see(1, lambda: 2) == 0  # one of the two was started again
+    assert [several.see(each, lambda: 2) for each in (1050, 2, 1051)] == [0, 0, 0]
 
 
 FLOOD = """
