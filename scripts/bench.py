@@ -7,7 +7,7 @@ import sys
 import _environment
 
 if __name__ == "__main__":
-    _environment.prepare(("bench",) if {"clik", "vision"} & set(sys.argv) else ())  # what these two compare with
+    _environment.prepare(("bench",) if {"clik", "log", "vision"} & set(sys.argv) else ())  # what these compare with
 
 import json
 from pathlib import Path
@@ -30,6 +30,7 @@ from tulip_sim.bench import (
     kick,
     latency,
     localization,
+    log,
     match,
     odometry,
     push,
@@ -43,7 +44,7 @@ from tulip_sim.bench.runner import Row, run, save, write_results
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress),
-    *(vision, localization, ball, head, latency),
+    *(vision, localization, ball, head, latency, log),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"

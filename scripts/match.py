@@ -11,16 +11,17 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
+from tulip_ros.recorder_node import PICTURES
 from tulip_sim.lockstep import Settings
 from tulip_sim.match_graph import play_graph
 from tulip_sim.match_lockstep import play_lockstep
@@ -58,6 +59,9 @@ def main(
         str,
         typer.Option(help="camera (pictures and vision), or features made up from the truth: degraded or ideal"),
     ] = "camera",
+    pictures: Annotated[
+        str, typer.Option(help=f"The camera's pictures in the recording: {', '.join(PICTURES)} (graph).")
+    ] = "compressed",
     teams: Annotated[
         int, typer.Option(help="1 for a trial against a figure, 2 for a match of two robots.", min=1, max=2)
     ] = 1,
@@ -84,6 +88,11 @@ def main(
             raise BadInputError(f"--eyes is {eyes!r}; expected one of {', '.join(EYES)}.")
         if mode != "graph" and (parameters or logs):
             raise BadInputError("--parameters and --logs are for nodes; expected --mode graph with them.")
+        if pictures not in PICTURES:
+            raise BadInputError(f"--pictures is {pictures!r}; expected one of {', '.join(PICTURES)}.")
+        if mode != "graph" and pictures != "compressed":
+            raise BadInputError("--pictures is for --mode graph; in lockstep pictures are recorded compressed.")
+        own = {"recorder": {"pictures": pictures}}
         if teams == 2:
             match = match_settings(trials, playing_time, striker, keeper, EYES[eyes])
             if mode == "graph" and EYES[eyes] is not None:
@@ -92,7 +101,7 @@ def main(
             check_writable(json_path, "--json")
         folder = None if no_record else record or default_folder(seed, mode if teams == 1 else f"match_{mode}")
         if teams == 2:
-            result = play_match(seed, mode, match, folder, parameters or (), referee_port, logs, console)
+            result = play_match(seed, mode, match, folder, parameters or (), own, referee_port, logs, console)
             report(result.report.verdict, result, console)
             if json_path is not None:
                 json_path.write_text(json.dumps(result.as_dict(), indent=2) + "\n")
@@ -118,6 +127,7 @@ def main(
                     show,
                     lambda line: console.print(line, highlight=False, markup=False),
                     parameters or (),
+                    own,
                     referee_port=referee_port,
                     logs=logs,
                     perception=EYES[eyes],
@@ -168,6 +178,7 @@ def play_match(
     settings: MatchSettings,
     folder: Path | None,
     parameters: Sequence[Path],
+    values: Mapping[str, Mapping[str, Any]],
     referee_port: int,
     logs: Path | None,
     console: Console,
@@ -187,7 +198,7 @@ def play_match(
 
         if mode == "graph":
             ports = (referee_port, referee_port + 2)
-            plan = match_plan(seed, rules, folder, parameters, None, ports, settings.striker, settings.keeper)
+            plan = match_plan(seed, rules, folder, parameters, values, ports, settings.striker, settings.keeper)
             return play_match_graph(plan, seed, folder, show, say, logs)
         beside = (os.cpu_count() or 1) > 1 and all(robot.perception is None for robot in settings.robots)
         return play_lockstep_match(seed, settings, folder, show, say, eyes_beside=beside)

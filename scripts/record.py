@@ -15,7 +15,7 @@ import typer
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
 from tulip_ros.plan import check_namespace
-from tulip_ros.recorder_node import RecorderNode, RecorderParameters
+from tulip_ros.recorder_node import PICTURES, RecorderNode, RecorderParameters
 from tulip_ros.run import run
 
 
@@ -27,13 +27,23 @@ def main(
     exclude: Annotated[
         list[str] | None, typer.Option(help="Regular expression of whole topic names; repeatable.")
     ] = None,
+    pictures: Annotated[
+        str, typer.Option(help=f"The cameras' pictures: {', '.join(PICTURES)}. Raw ones take 14 MB a second each.")
+    ] = "compressed",
+    split_size: Annotated[float, typer.Option(help="MB after which the next file is begun; 0 for one file.")] = 0.0,
+    split_time: Annotated[float, typer.Option(help="Seconds after which the next file is begun; 0: never.")] = 0.0,
     namespace: Annotated[str, typer.Option(help="Namespace of the robot, as in 'striker'.")] = "",
 ) -> None:
     """Record all topics, or those that match."""
     try:
         namespace = check_namespace(namespace)
         settings = RecorderParameters(
-            path=str(path) if path else "", include=tuple(include or ()), exclude=tuple(exclude or ())
+            path=str(path) if path else "",
+            include=tuple(include or ()),
+            exclude=tuple(exclude or ()),
+            pictures=pictures,
+            split_size=split_size,
+            split_time=split_time,
         )
     except (BadInputError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)

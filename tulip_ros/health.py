@@ -43,14 +43,15 @@ class Health:
         """Forget the newest stamp: time began anew."""
         self._newest = 0
 
-    def count(self, event: str, warning: str = "") -> None:
+    def count(self, event: str, warning: str = "", times: int = 1) -> None:
         """Count an event.
 
         Args:
             event: A few fixed words, the key in the diagnostics, as in "rejected features".
             warning: What is wrong, in words: goes into the status, and into the log (once a second at most).
+            times: How often it happened.
         """
-        self._events[event] += 1
+        self._events[event] += times
         if warning:
             self._warning, self._warned_at = warning, monotonic()
             self._node.get_logger().warning(warning, throttle_duration_sec=1.0)

@@ -33,6 +33,16 @@ def flatten(parameters: Any, prefix: str = "") -> dict[str, Any]:
     return {name: value for name, _, value in _walk(parameters, prefix)}
 
 
+def plain(parameters: Any, prefix: str = "") -> dict[str, Any]:
+    """Return the fields of a dataclass object by dotted name, as parameter files hold them.
+
+    Args:
+        parameters: Object of a dataclass.
+        prefix: Put before each name.
+    """
+    return {name: _to_ros(value) for name, value in flatten(parameters, prefix).items()}
+
+
 def replace(parameters: P, overrides: Mapping[str, Any], node: str) -> P:
     """Return the parameters with some values replaced.
 

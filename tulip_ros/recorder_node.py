@@ -4,24 +4,35 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.subscription import Subscription
+from rclpy.type_support import check_is_valid_msg_type
 
-from tulip_ros import schemas, topics
-from tulip_ros.bag import Bag
+from tulip_ros import log_notes, parameters, schemas, topics
+from tulip_ros.bag import FREE, Bag, Split
 from tulip_ros.errors import BadInputError
+from tulip_ros.lost_messages import LostMessages
+from tulip_ros.node_parameters import ParameterAsker
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.topics import Quality
 
-LOOK = 0.5  # [s] between two looks for new topics and at the file
-WAITING = 100  # messages of one topic that wait while a chunk is compressed
+LOOK = 0.5  # [s] between two looks for new topics and nodes, and at the disk
+COLLECT = 0.02  # [s] between two times that waiting messages are taken: one waking for many is cheap
+WAITING = 200  # messages of one topic that wait while the recorder is busy: 0.8 s at 250 Hz
 HIDDEN = re.compile(r"(^|/)_|^/parameter_events$")
+PICTURES = {
+    "compressed": (r"/(.*/)?camera/image_raw", r"/(.*/)?vision/picture"),
+    "raw": (r"/(.*/)?camera/image_raw/compressed",),
+    "both": (),
+    "none": (r"/(.*/)?camera/image_raw", r"/(.*/)?camera/image_raw/compressed", r"/(.*/)?vision/picture"),
+}
+"""Which topics each choice of pictures leaves out."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +46,11 @@ class RecorderParameters:
         include: Regular expressions; a topic must match one of them (whole name). None: every topic.
         exclude: Regular expressions; a topic must match none of them.
         robots: Namespaces, below the node's own, of robots whose topics are subscribed before they appear.
+        pictures: "compressed" (40 KB each), "raw" (0.9 MB), "both" or "none".
+        split_size: Size of a file after which the recording goes on in another one [MB]; 0 for one file.
+        split_time: Time in a file after which the recording goes on in another one [s]; 0 for one file.
+        free_space: Disk space to leave free [MB].
+        notes: What goes into the recording about itself, as in "seed=1".
     """
 
     folder: str = "recordings"
@@ -43,13 +59,31 @@ class RecorderParameters:
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     robots: tuple[str, ...] = ("",)
+    pictures: str = "compressed"
+    split_size: float = 0.0
+    split_time: float = 0.0
+    free_space: float = FREE / 1e6
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            ValueError: if one is not usable.
+        """
         for expression in (*self.include, *self.exclude):
             try:
                 re.compile(expression)
             except re.error as error:
                 raise ValueError(f"{expression!r} is no regular expression: {error}") from error
+        if self.pictures not in PICTURES:
+            raise ValueError(f"pictures is {self.pictures!r}; expected one of {', '.join(PICTURES)}")
+        if not self.free_space >= 0.0:
+            raise ValueError(f"free_space is {self.free_space} MB; expected >= 0")
+        for note in self.notes:
+            if "=" not in note:
+                raise ValueError(f"note {note!r} has no value; expected name=value")
+        Split(int(self.split_size * 1e6), self.split_time)
 
     def wants(self, name: str) -> bool:
         """Return whether a topic is to be recorded.
@@ -58,11 +92,40 @@ class RecorderParameters:
             name: Full name, as in /striker/odometry.
         """
         included = not self.include or any(re.fullmatch(each, name) for each in self.include)
-        return included and not any(re.fullmatch(each, name) for each in self.exclude) and not HIDDEN.search(name)
+        excluded = any(re.fullmatch(each, name) for each in (*self.exclude, *PICTURES[self.pictures]))
+        return included and not excluded and not HIDDEN.search(name)
+
+
+@dataclass
+class _Input:
+    """One subscription."""
+
+    name: str
+    type_name: str
+    quality: Quality
+    message_class: type[Any]
+    subscription: Any
+    numbers: LostMessages = field(default_factory=LostMessages)
+
+    def take(self) -> Iterable[tuple[int, int, _Input, bytes, int]]:
+        """Yield what came in since the last time: when, when it was sent [ns since 1970], from here, data, number."""
+        subscription, message_class = self.subscription, self.message_class
+        for _ in range(WAITING):
+            taken = subscription.take_message(message_class, True)
+            if taken is None:
+                return
+            data, about = taken
+            sent = about["source_timestamp"]
+            # A clock that another machine has set is no reason to refuse a message.
+            yield about["received_timestamp"] or time.time_ns(), sent, self, data, about["publication_sequence_number"]
 
 
 class RecorderNode(ComponentNode):
-    """Subscribes to serialized messages and writes them as they are."""
+    """Takes serialized messages and writes them as they are.
+
+    Messages wait in the middleware until the node takes all of them at once. No executor knows of the subscriptions:
+    the quick one cannot tell a callback a message's number, which shows what was lost.
+    """
 
     def __init__(self, settings: RecorderParameters | None = None, namespace: str = "") -> None:
         """Make the node.
@@ -74,8 +137,16 @@ class RecorderNode(ComponentNode):
         super().__init__("recorder", namespace=namespace)
         self.settings = self.load(settings or RecorderParameters())
         self.bag: Bag | None = None
-        self.inputs: dict[str, Subscription] = {}
-        self.qualities: dict[str, tuple[str, Quality]] = {}
+        self.inputs: dict[str, _Input] = {}
+        self.lost: dict[str, int] = {}
+        """Messages that were lost during the recording, by topic."""
+        self.known: dict[str, dict[str, Any]] = {
+            self.get_fully_qualified_name(): parameters.plain(self.settings),
+        }
+        """Parameters of nodes."""
+        self._latched: dict[str, tuple[_Input, bytes, int]] = {}  # last message of each latched topic, and when sent
+        self._refused: set[str] = set()
+        self._asker = ParameterAsker(self, self.learn)
         self.create_service(topics.START_RECORDING.type, topics.START_RECORDING.name, self.on_start)
         self.create_service(topics.STOP_RECORDING.type, topics.STOP_RECORDING.name, self.on_stop)
         if self.settings.start:
@@ -86,6 +157,7 @@ class RecorderNode(ComponentNode):
             self.subscribe(
                 self.resolve_topic_name(topic.name), topic.type_name, topic.quality, ReliabilityPolicy.RELIABLE
             )
+        self.every(COLLECT, self.collect)
         self.every(LOOK, self.discover)
 
     def begin(self, path: str) -> Path:
@@ -97,28 +169,99 @@ class RecorderNode(ComponentNode):
         Raises:
             BadInputError: if it cannot be written.
         """
-        folder = Path(path) if path else Path(self.settings.folder) / datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
-        self.bag = Bag(folder.absolute())
+        settings = self.settings
+        folder = Path(path) if path else Path(settings.folder) / datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
+        self.take()  # what came before does not belong to it
+        split = Split(int(settings.split_size * 1e6), settings.split_time)
+        bag = Bag(folder.absolute(), split, int(settings.free_space * 1e6))
+        try:
+            own = dict(note.split("=", 1) for note in settings.notes)
+            log_notes.explain(bag, {**own, "time": "of reception, in ns since 1970"})
+            for name, values in self.known.items():
+                log_notes.attach_parameters(bag, name, values)
+        except OSError as error:
+            raise BadInputError(
+                f"Recording {bag.folder} cannot be written: {error.strerror}. Name another folder, or make room."
+            ) from error
+        self.bag, self.lost = bag, {}
+        now = time.time_ns()  # a recording that begins later begins with what holds then
+        self.write([(now, sent, source, data, 0) for source, data, sent in self._latched.values()])
         self.get_logger().info(f"recording to {self.bag.path}")
         return self.bag.path
 
     def end(self) -> str:
-        """End the recording and return what was written, in words."""
+        """End the recording and return what was written, in words.
+
+        Raises:
+            OSError: if it could not be ended; what reached the disk can be recovered.
+        """
+        if self.bag is None:
+            return "nothing was being recorded"
+        self.write(self.take())
         bag, self.bag = self.bag, None
         if bag is None:
-            return "nothing was being recorded"
+            return "the recording ended early"
+        bag.note(log_notes.LOST, {name: str(count) for name, count in sorted(self.lost.items())} or {"all": "0"})
         bag.close()
-        return f"{bag.path}: {bag.messages} messages, {bag.size() / 1e6:.1f} MB"
+        lost = f", {sum(self.lost.values())} more were lost before" if self.lost else ""
+        where = bag.path if len(bag.paths) == 1 else f"{bag.folder} ({len(bag.paths)} files)"
+        return f"{where}: {bag.messages} messages, {bag.size() / 1e6:.1f} MB{lost}"
+
+    def collect(self) -> None:
+        """Write what came in, and have it on the disk in time."""
+        messages = self.take()
+        if self.bag is None:
+            return
+        self.write(messages)
+        if self.bag is not None:
+            try:
+                self.bag.flush()
+            except OSError as error:
+                self.give_up(error)
+
+    def take(self) -> list[tuple[int, int, _Input, bytes, int]]:
+        """Take all messages that wait, in the order in which they came."""
+        messages = [message for each in self.inputs.values() for message in each.take()]
+        messages.sort(key=lambda message: message[0])
+        for _, sent, source, data, number in messages:
+            if source.quality.latched:
+                self._latched[source.name] = (source, data, sent)
+            missing = source.numbers.see(number, source.subscription.get_publisher_count)
+            if missing:
+                self.lost[source.name] = self.lost.get(source.name, 0) + missing
+                self.health.count("lost messages", f"{missing} messages of {source.name} did not arrive", missing)
+        return messages
+
+    def write(self, messages: Iterable[tuple[int, int, _Input, bytes, int]]) -> None:
+        """Write messages that were taken."""
+        bag = self.bag
+        if bag is None:
+            return
+        try:
+            for received, sent, source, data, _ in messages:
+                bag.add_topic(source.name, source.type_name, source.quality)
+                bag.write(source.name, data, received, sent)
+        except OSError as error:
+            self.give_up(error)
+
+    def learn(self, node: str, values: dict[str, Any]) -> None:
+        """Note the parameters of a node."""
+        self.known[node] = values
+        if self.bag is not None:
+            try:
+                log_notes.attach_parameters(self.bag, node, values, time.time_ns())
+            except OSError as error:
+                self.give_up(error)
 
     def discover(self) -> None:
-        """Subscribe to topics that appeared, and look after the file."""
+        """Subscribe to topics that appeared, ask nodes that appeared, and look after the disk."""
         for name, types in self.get_topic_names_and_types():
             if name not in self.inputs and len(types) == 1 and "/msg/" in types[0]:
                 self.subscribe(name, types[0], *self.offered(name))
+        self._asker.look()
         if self.bag is None:
             return
         try:
-            self.bag.flush()
             if not self.bag.has_space():
                 self.health.count("disk full", f"recording ended, the disk is nearly full: {self.end()}")
         except OSError as error:
@@ -133,12 +276,13 @@ class RecorderNode(ComponentNode):
 
     def subscribe(self, name: str, type_name: str, quality: Quality, reliability: ReliabilityPolicy) -> None:
         """Record a topic from now on, if it is wanted and its type is known."""
-        if name in self.inputs or not self.settings.wants(name):
+        if name in self.inputs or name in self._refused or not self.settings.wants(name):
             return
         try:
             message_class = schemas.message_class(type_name)
             schemas.definition(type_name)
         except LookupError as error:
+            self._refused.add(name)
             self.health.count("topics of unknown type", f"topic {name} is not recorded: {error}")
             return
         profile = QoSProfile(
@@ -147,28 +291,25 @@ class RecorderNode(ComponentNode):
             reliability=reliability,
             durability=DurabilityPolicy.TRANSIENT_LOCAL if quality.latched else DurabilityPolicy.VOLATILE,
         )
-        self.qualities[name] = (type_name, quality)
-        self.inputs[name] = self.create_subscription(message_class, name, self.writer(name), profile, raw=True)
-
-    def writer(self, name: str) -> Callable[[bytes], None]:
-        """Return the callback that writes one topic's messages."""
-
-        def write(data: bytes) -> None:
-            if self.bag is None:
-                return
-            try:
-                self.bag.add_topic(name, *self.qualities[name])
-                self.bag.write(name, data, time.time_ns())
-            except OSError as error:
-                self.give_up(error)
-
-        return write
+        check_is_valid_msg_type(message_class)  # loads what the middleware needs to know of the type
+        with self.handle:
+            subscription = rclpy_implementation.Subscription(
+                self.handle, message_class, name, profile.get_c_qos_profile()
+            )
+        self.inputs[name] = _Input(name, type_name, quality, message_class, subscription)
 
     def give_up(self, error: OSError) -> None:
-        """End a recording that cannot go on; what reached the disk can be recovered."""
-        path = self.bag.path if self.bag else None
-        self.bag = None
-        self.health.count("write errors", f"recording {path} ended early: {error}")
+        """End a recording that cannot go on; what reached the disk is kept."""
+        bag, self.bag = self.bag, None
+        if bag is None:
+            return
+        try:
+            bag.close()
+        except OSError:
+            pass  # the same, mostly: that is told below
+        mend = "it is whole until then" if bag.ended else f"mend it: python3 scripts/recover.py {bag.folder}"
+        reason = error.strerror or str(error)
+        self.health.count("write errors", f"recording {bag.folder} ended early ({reason}); {mend}")
 
     def on_start(self, request: Any, response: Any) -> Any:
         """Serve start_recording."""
@@ -193,7 +334,14 @@ class RecorderNode(ComponentNode):
     def destroy_node(self) -> None:
         """End the recording, then the node."""
         if self.bag is not None:
-            print(f"recorded {self.end()}", flush=True)  # ROS may have ended, and its log with it
+            try:
+                told = f"recorded {self.end()}"
+            except OSError as error:
+                told = f"error: the recording could not be ended: {error.strerror or error}"
+            print(told, flush=True)  # ROS may have ended, and its log with it
+        for each in self.inputs.values():
+            each.subscription.destroy_when_not_in_use()
+        self.inputs.clear()
         super().destroy_node()
 
 

@@ -21,6 +21,7 @@ from tulip_motion.messages import (
 )
 from tulip_ros import topics
 from tulip_ros.bag import Bag
+from tulip_ros.log_notes import Notebook
 from tulip_ros.topics import Topic
 from tulip_sim.messages import jpeg_to_message, report_to_message, truth_to_message
 from tulip_strategy.messages import (
@@ -86,6 +87,11 @@ class LockstepRecording:
             "initialpose": lambda stamp, value: [(topics.START_POSE, start_pose_to_message(value, stamp))],
             "referee/report": lambda stamp, value: [(topics.REPORT, report_to_message(value))],
         }
+
+    @property
+    def notebook(self) -> Notebook:
+        """What takes notes about how the recording came to be."""
+        return self._bag
 
     def write(self, topic: str, stamp: int, value: object, namespace: str = "") -> None:
         """Write what was told on a topic at a stamp [ns].

@@ -29,8 +29,6 @@ NODES = ("vision", "worldmodel", "head", "motion", "strategy", "game_input", "us
 LOOK = 0.1  # [s] between two looks at the processes
 SILENCE = 60.0  # [s] of wall-clock time without news from the simulator after which the trial is given up
 ENDING = 0.5  # [s] of wall-clock time that the recording goes on after the end
-UNRECORDED = ("/(.*/)?camera/image_raw", "/(.*/)?vision/picture")
-"""Pictures go into the recording compressed."""
 
 Progress = Callable[[float, str], None]
 """Is told simulated time [s] and what the robot is doing."""
@@ -115,7 +113,10 @@ def trial_plan(
         given["perception"] = {"seed": seed, **{f"quality.{name}": value for name, value in asdict(perception).items()}}
     if record is not None:
         nodes.append("recorder")
-        given["recorder"] = {"path": str(record.absolute()), "exclude": list(UNRECORDED)}
+        given["recorder"] = {
+            "path": str(record.absolute()),
+            "notes": [f"seed={seed}", f"scenario={scenario}", f"strategy={strategy}", "mode=graph", "robots=1"],
+        }
         given["driver"]["wait_for"] = list(nodes)
     refuse_taken(parameter_files, given, "trial")
     for name, own in (values or {}).items():

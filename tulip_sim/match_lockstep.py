@@ -10,6 +10,7 @@ import numpy as np
 
 from tulip_description.field import load_field
 from tulip_sim.lockstep import Lockstep, Settings
+from tulip_sim.lockstep_notes import explain_trial
 from tulip_sim.lockstep_recording import LockstepRecording
 from tulip_sim.scenario import make_scenario
 from tulip_sim.trial import NO_CAMERA, TrialObserver, TrialSummary
@@ -52,6 +53,8 @@ def play_lockstep(
     trial: Lockstep | None = None
     try:
         start = make_scenario(scenario, np.random.default_rng(seed), load_field())
+        if recording is not None:
+            explain_trial(recording.notebook, seed, scenario, start.robot, settings, strategy)
         trial = Lockstep(start, seed, settings, listen, eyes_beside)
         if strategy != trial.user.strategy:
             trial.ask(UserRequest.PLAY, strategy)

@@ -19,7 +19,7 @@ from tulip_ros.launch import Launcher
 from tulip_ros.plan import Start, make_plan
 from tulip_ros.run import ComponentNode, session
 from tulip_ros.time import stamp_of
-from tulip_sim.match_graph import ENDING, LOOK, NODES, SILENCE, UNRECORDED, refuse_taken
+from tulip_sim.match_graph import ENDING, LOOK, NODES, SILENCE, refuse_taken
 from tulip_sim.match_report import MatchReport
 from tulip_sim.match_rules import COLOUR_NAMES, NAMESPACES, STRATEGY_OF, TEAMS, MatchRules, Role
 from tulip_sim.match_summary import MatchSummary
@@ -126,7 +126,11 @@ def match_plan(
         }
     }
     if record is not None:
-        own["recorder"] = {"path": str(record.absolute()), "exclude": list(UNRECORDED), "robots": list(NAMESPACES)}
+        own["recorder"] = {
+            "path": str(record.absolute()),
+            "robots": list(NAMESPACES),
+            "notes": [f"seed={seed}", f"striker={striker}", f"keeper={keeper}", "mode=graph", "robots=2"],
+        }
     refuse_taken(parameter_files, own, "match")
     for name in ("driver", "recorder"):
         own.setdefault(name, {}).update((values or {}).get(name, {}))

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tulip_sim.lockstep_match import LockstepMatch
+from tulip_sim.lockstep_notes import explain_match
 from tulip_sim.lockstep_recording import LockstepRecording
 from tulip_sim.match_places import team_truth
 from tulip_sim.match_rules import NAMESPACES, TEAMS
@@ -68,6 +69,8 @@ def play_lockstep_match(
             progress(now.stamp * 1e-9, f"trial {now.referee.trial}: {doing}")
 
     try:
+        if recording is not None:
+            explain_match(recording.notebook, seed, settings)
         match = LockstepMatch(seed, settings, listen, eyes_beside)
         begin = time.monotonic()
         report = match.play(watch)

@@ -54,7 +54,7 @@ with session(lambda: ComponentNode("motion", namespace="striker"), ["test"]) as 
 
 @pytest.mark.ros
 def test_everything_published_is_read_back_by_another_reader(ros_domain: int, tmp_path: Path):
-    settings = RecorderParameters(path=str(tmp_path / "trial"), exclude=("/rosout",))
+    settings = RecorderParameters(path=str(tmp_path / "trial"), exclude=("/rosout",), pictures="raw")
     with session(lambda: RecorderNode(settings, "striker"), ["test"]) as (node, spin):
         assert node.bag is not None
         publisher = subprocess.Popen([sys.executable, "-c", PUBLISHER])
@@ -90,12 +90,20 @@ def write_states(recording: bag.Bag, count: int) -> list[bytes]:
     return written
 
 
+def written_beside(recording: bag.Bag) -> bytes:
+    """Return the first file once the thread that writes it has written the chunk."""
+    deadline = time.monotonic() + 10.0
+    while len(recording.path.read_bytes()) < 100 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return recording.path.read_bytes()
+
+
 def test_what_was_flushed_is_readable_without_an_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     recording = bag.Bag(tmp_path / "killed")
     monkeypatch.setattr(bag, "FLUSH", 0.0)
     written = write_states(recording, 3)
     recording.flush()
-    data = recording.path.read_bytes()
+    data = written_beside(recording)
     records = []
     reader = StreamReader(io.BytesIO(data))
     try:
@@ -156,7 +164,8 @@ def test_services_start_and_stop_recordings(ros_domain: int, tmp_path: Path):
         assert begun.success and begun.message == str(tmp_path / "one" / "one.mcap")
         again = node.on_start(start.Request(), start.Response())
         assert not again.success and "stop it first" in again.message
-        node.writer("/motion_state")(serialize_message(MotionState()))
+        source = node.inputs["/motion_state"]
+        node.write([(2, 1, source, serialize_message(MotionState()), 1)])
         ended = node.on_stop(stop.Request(), stop.Response())
         assert ended.success and "1 messages" in ended.message
         refused = node.on_start(start.Request(path=str(tmp_path / "one")), start.Response())

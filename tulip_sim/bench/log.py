@@ -1,0 +1,96 @@
+"""Recording: what it costs, how fast it is, how large, and what is left when the recorder is killed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+import numpy as np
+
+from tulip_sim.bench import log_kill, log_match, log_throughput
+from tulip_sim.bench.runner import Bench, Row
+
+SHARE, SIZE, LOSS = 0.10, 150.0, 1.0  # asked for: of a core; [MB] of 10 minutes; [s] lost at most
+KILLS = 20
+WRITERS = ("ours", "rosbags zstd", "rosbags")
+PARTS: dict[str, Callable[..., Row]] = {
+    "match": log_match.measure,
+    "throughput": log_throughput.measure,
+    "kill": log_kill.measure,
+}
+TRIALS = [
+    ("match", 1, 1),
+    ("match", 2, 1),
+    ("throughput", "small messages"),
+    ("throughput", "pictures"),
+    *(("kill", number) for number in range(1, KILLS + 1)),
+]
+
+
+def measure(part: str, *arguments: int | str) -> Row:
+    """Run one trial of a part."""
+    os.environ.setdefault("ROS_DOMAIN_ID", str(60 + os.getpid() % 40))  # no other graph on this machine is recorded
+    return PARTS[part](*arguments)
+
+
+def summarize(rows: list[Row]) -> list[str]:
+    """Return a table for each part."""
+    lines: list[str] = []
+    for part, tell in (("match", _matches), ("throughput", _throughput), ("kill", _kills)):
+        of_part = [row for row in rows if row["part"] == part]
+        if of_part:
+            lines += ["", *tell(of_part)] if lines else tell(of_part)
+    return lines
+
+
+def _matches(rows: list[Row]) -> list[str]:
+    lines = [
+        f"A graph with camera is recorded for {log_match.WATCHED:.0f} s of play: all topics, pictures as JPEG. Asked"
+        f" for: {SHARE:.0%} of a core in real time, nothing lost, 10 minutes in {SIZE:.0f} MB (extrapolated from that"
+        " time). CPU by simulated time is the core's share at real time; it counts more than it should"
+        " where the simulation is slower than real time, as some of the work comes by the wall clock.",
+        "",
+        "| robots | real-time factor | share of a core | CPU by simulated time | messages | lost"
+        " | one picture | 10 minutes | of it pictures |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in rows:
+        share = row["pictures [MB]"] / max(row["written [MB]"], 1e-9)
+        lines.append(
+            f"| {row['robots']} | {row['real-time factor']} | {row['recorder, share of a core']:.1%}"
+            f" | {row['recorder [s] per simulated second']:.1%} | {row['messages']} | {row['lost']}"
+            f" | {row['one picture [kB]']} kB | {row['10 minutes [MB]']} MB | {share:.0%} |"
+        )
+    return lines
+
+
+def _throughput(rows: list[Row]) -> list[str]:
+    lines = [
+        f"Writers in turns in one process, median of {log_throughput.ROUNDS} rounds, with the file's end. Ours"
+        " compresses in chunks and tells the disk to keep them; rosbags' writer does so with zstd or not at all, and"
+        " never asks the disk. Asked for: at least as fast.",
+        "",
+        "| messages | ours | rosbags, zstd | rosbags, not compressed |",
+        "| --- | --- | --- | --- |",
+    ]
+    for row in rows:
+        cells = [
+            f"{row[f'{name} [1/s]']} / s, {row[f'{name} [MB/s]']} MB/s, {row[f'{name} [MB written]']} MB"
+            for name in WRITERS
+        ]
+        lines.append(f"| {row['messages']} {row['kind']} of {row['bytes each']} B | {' | '.join(cells)} |")
+    return lines
+
+
+def _kills(rows: list[Row]) -> list[str]:
+    losses = [row["lost [s]"] for row in rows]
+    equal = sum(row["equal"] for row in rows)
+    return [
+        f"`kill -9` of the recorder at {len(rows)} random moments, 1000 small messages and 15 pictures a second:"
+        f" after `recover.py`, {equal} of {len(rows)} recordings are, read by rosbags, message by message what an"
+        f" independent subscriber got, up to {np.median(losses):.2f} s (median; at most {max(losses):.2f} s) before the"
+        f" kill. Asked for: all, {LOSS:.0f} s at most.",
+    ]
+
+
+BENCH = Bench("log", "Recording", TRIALS, measure, summarize, workers=1)

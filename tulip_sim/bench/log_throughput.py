@@ -1,0 +1,98 @@
+"""How fast the recorder's writer takes messages, beside rosbags' writer, in turns in one process."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import Image, JointState
+
+from tulip_ros import schemas, topics
+from tulip_ros.bag import Bag
+from tulip_sim.bench.runner import Row
+
+ROUNDS = 5
+SMALL, PICTURES = 100_000, 150
+UNIQUE = 20_000  # small messages: 14 MB, so that none comes twice in one chunk
+COLLECTED = 30  # messages that the recorder takes at one time during a match
+
+
+def measure(kind: str) -> Row:
+    """Write the same messages with each writer in turn.
+
+    Args:
+        kind: "small messages" (joint states of the 14 joints, with noise) or "pictures" (640x480, raw, with noise).
+    """
+    messages, topic = _joint_states() if kind == "small messages" else _pictures()
+    writers: dict[str, Callable[[Path, list[bytes], topics.Topic], None]] = {
+        "ours": _ours,
+        "rosbags zstd": lambda folder, data, topic: _rosbags(folder, data, topic, True),
+        "rosbags": lambda folder, data, topic: _rosbags(folder, data, topic, False),
+    }
+    times: dict[str, list[float]] = {name: [] for name in writers}
+    sizes: dict[str, int] = {}
+    with tempfile.TemporaryDirectory(prefix="tulip_log_") as scratch:
+        for _ in range(ROUNDS):
+            for name, write in writers.items():
+                folder = Path(scratch) / "bag"
+                begin = time.perf_counter()
+                write(folder, messages, topic)
+                times[name].append(time.perf_counter() - begin)
+                sizes[name] = sum(file.stat().st_size for file in folder.glob("*.mcap"))
+                shutil.rmtree(folder)
+    size = sum(map(len, messages))
+    row: Row = {"part": "throughput", "kind": kind, "messages": len(messages), "bytes each": size // len(messages)}
+    for name, spent in times.items():
+        row[f"{name} [1/s]"] = round(len(messages) / float(np.median(spent)))
+        row[f"{name} [MB/s]"] = round(size / 1e6 / float(np.median(spent)), 1)
+        row[f"{name} [MB written]"] = round(sizes[name] / 1e6, 1)
+    return row
+
+
+def _joint_states() -> tuple[list[bytes], topics.Topic]:
+    rng = np.random.default_rng(1)
+    names = [f"joint_{number}_of_the_leg" for number in range(14)]
+    values = rng.normal(size=(UNIQUE, 3, 14)).round(4).tolist()
+    data = [serialize_message(JointState(name=names, position=p, velocity=v, effort=e)) for p, v, e in values]
+    return [data[number % len(data)] for number in range(SMALL)], topics.JOINT_STATES
+
+
+def _pictures() -> tuple[list[bytes], topics.Topic]:
+    rng = np.random.default_rng(1)
+    rows, columns = np.mgrid[:480, :640]
+    scene = np.stack([rows / 3.0, 90.0 + columns / 10.0, 40.0 + (columns // 80 % 2) * 60.0], axis=-1)
+    data = []
+    for _ in range(10):
+        image = Image(height=480, width=640, encoding="bgr8", step=1920)
+        noisy = np.clip(scene + rng.normal(scale=4.0, size=scene.shape), 0.0, 255.0).astype(np.uint8)
+        image.data.frombytes(noisy.tobytes())
+        data.append(serialize_message(image))
+    return [data[number % len(data)] for number in range(PICTURES)], topics.CAMERA_IMAGE
+
+
+def _ours(folder: Path, messages: list[bytes], topic: topics.Topic) -> None:
+    bag = Bag(folder, free=0)
+    bag.add_topic(f"/{topic.name}", topic.type_name, topic.quality)
+    for number, data in enumerate(messages):
+        bag.write(f"/{topic.name}", data, number * 1_000_000)
+        if number % COLLECTED == 0:
+            bag.flush()
+    bag.close()
+
+
+def _rosbags(folder: Path, messages: list[bytes], topic: topics.Topic, compressed: bool) -> None:
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+    writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
+    if compressed:
+        writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    with writer:
+        definition = schemas.definition(topic.type_name)
+        connection = writer.add_connection(f"/{topic.name}", topic.type_name, msgdef=definition, rihs01="RIHS01_0")
+        for number, data in enumerate(messages):
+            writer.write(connection, number * 1_000_000, data)
