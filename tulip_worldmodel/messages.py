@@ -36,6 +36,7 @@ def features_from_message(message: FeaturesMessage) -> Features:
                 end_azimuth=each.end_azimuth,
                 end_elevation=each.end_elevation,
                 angular_radius=each.angular_radius,
+                side=each.side,
             )
             for each in message.features
         ),
