@@ -106,7 +106,8 @@ class _Robot:
             self.stages.append(HeadStage(p.head))
         self.writes = frozenset().union(*(stage.writes for stage in self.stages))
         self.reads = frozenset().union(*(stage.reads for stage in self.stages)) | self.writes
-        self.comparisons = {name: Comparison(name) for name in sorted(self.writes)}
+        # What was not recorded has nothing to be compared with; the new recording holds it all the same.
+        self.comparisons = {name: Comparison(name) for name in sorted(self.writes) if _full(namespace, name) in log.topics}
         self.lossy = False
         self.judge = Judge(p.field) if judge and _full(namespace, topics.GROUND_TRUTH.name) in log.topics else None
         self.bag: Bag | None = None
@@ -148,7 +149,8 @@ class _Robot:
         """Write and compare recomputed messages, and let the later stages hear them."""
         for made in messages:
             data = serialize_message(made.message)
-            self.comparisons[made.name].add_made(made.stamp, data, made.message)
+            if made.name in self.comparisons:
+                self.comparisons[made.name].add_made(made.stamp, data, made.message)
             if self.bag is not None:
                 self.bag.write(self._declared(made.name), data, made.log_time)
             if self.judge is not None:
