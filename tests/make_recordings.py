@@ -23,6 +23,7 @@ from tulip_ros.log_file import Log
 from tulip_ros.time import stamp_of
 from tulip_sim.lockstep import Lockstep, Settings
 from tulip_sim.lockstep_match import LockstepMatch
+from tulip_sim.lockstep_notes import explain_match, explain_trial
 from tulip_sim.lockstep_recording import LockstepRecording
 from tulip_sim.match_rules import NAMESPACES
 from tulip_sim.match_settings import MatchSettings
@@ -45,7 +46,9 @@ def trial(folder: Path, seconds: float, perception: PerceptionParameters | None)
     """Record the beginning of a trial, all topics, with pictures that lose nothing."""
     recorder = LockstepRecording(folder, "png")
     scenario = make_scenario("trial", np.random.default_rng(SEED), load_field())
-    run = Lockstep(scenario, SEED, Settings(perception=perception), recorder.write)
+    settings = Settings(perception=perception)
+    run = Lockstep(scenario, SEED, settings, recorder.write)
+    explain_trial(recorder.notebook, SEED, "trial", scenario.robot, settings, run.user.strategy)
     while run.stamp < seconds * 1e9:
         run.step()
     run.close()
@@ -60,7 +63,9 @@ def match(folder: Path, seconds: float) -> None:
     def listen(team: int, topic: str, stamp: int, value: object) -> None:
         recorder.write(topic, stamp, value, NAMESPACES[team])
 
-    run = LockstepMatch(SEED, MatchSettings(robots=(robot, robot)), listen)
+    settings = MatchSettings(robots=(robot, robot))
+    explain_match(recorder.notebook, SEED, settings)
+    run = LockstepMatch(SEED, settings, listen)
     while run.stamp < seconds * 1e9:
         run.step()
     run.close()
@@ -70,6 +75,7 @@ def match(folder: Path, seconds: float) -> None:
 def thin(source: Path, folder: Path, names: tuple[str, ...]) -> None:
     """Keep some topics: pictures as small JPEG, head angles at the odometry's instants alone."""
     with Log(source) as log, writing(folder) as bag:
+        bag.copy_notes(log)
         chosen = [full for full in log.topics if any(full.endswith(f"/{name}") for name in names)]
         slow = {record.log_time for record in log.records(["/odometry"])}
         counts: Counter[str] = Counter()

@@ -24,7 +24,9 @@ Handler = Callable[[Record], None]
 class Player:
     """Plays a passage through a node."""
 
-    def __init__(self, node: ComponentNode, log: Log, handlers: Mapping[str, Handler], settings: ReplayParameters) -> None:
+    def __init__(
+        self, node: ComponentNode, log: Log, handlers: Mapping[str, Handler], settings: ReplayParameters
+    ) -> None:
         """Offer the services; `advance` plays.
 
         Args:

@@ -170,7 +170,9 @@ class Passage:
     def before(self) -> list[Record]:
         """Return the last message before the beginning of each topic that keeps its last one for late listeners."""
         latched = [name for name in self.names if quality_of(self._log.topics[name]).latched]
-        newest = {record.topic.name: record for record in self._log.records(latched, None, self.first)} if latched else {}
+        newest = (
+            {record.topic.name: record for record in self._log.records(latched, None, self.first)} if latched else {}
+        )
         return list(newest.values())
 
 

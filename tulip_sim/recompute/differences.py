@@ -160,7 +160,9 @@ def _angle(one: Any, other: Any) -> float:
 
 
 def _poses(one: Any, other: Any) -> dict[str, float]:
-    return _moved(one.pose.pose.position, one.pose.pose.orientation, other.pose.pose.position, other.pose.pose.orientation)
+    return _moved(
+        one.pose.pose.position, one.pose.pose.orientation, other.pose.pose.position, other.pose.pose.orientation
+    )
 
 
 def _transforms(one: Any, other: Any) -> dict[str, float]:

@@ -107,8 +107,11 @@ class _Robot:
         self.writes = frozenset().union(*(stage.writes for stage in self.stages))
         self.reads = frozenset().union(*(stage.reads for stage in self.stages)) | self.writes
         # What was not recorded has nothing to be compared with; the new recording holds it all the same.
-        self.comparisons = {name: Comparison(name) for name in sorted(self.writes) if _full(namespace, name) in log.topics}
+        self.comparisons = {
+            name: Comparison(name) for name in sorted(self.writes) if _full(namespace, name) in log.topics
+        }
         self.lossy = False
+        self.forgotten = p.forgotten
         self.judge = Judge(p.field) if judge and _full(namespace, topics.GROUND_TRUTH.name) in log.topics else None
         self.bag: Bag | None = None
         self._topics: dict[str, LoggedTopic] = {}
@@ -198,6 +201,9 @@ def _run(log: Log, robots: Sequence[_Robot], bag: Bag | None, progress: Callable
     for robot in robots:
         robot.finish()
         where = f"{robot.namespace}: " if robot.namespace else ""
+        if robot.forgotten:
+            names = ", ".join(robot.forgotten)
+            shortcomings.append(f"{where}{len(robot.forgotten)} recorded parameters that no longer exist: {names}")
         for stage in robot.stages:
             shortcomings += [f"{where}{count} {reason}" for reason, count in stage.shortcomings().items()]
     return Outcome(

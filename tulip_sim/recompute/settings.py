@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import yaml
 from tulip_description.field import Field, FieldError, load_field
 from tulip_description.planar import Pose2D
 from tulip_motion.head import HeadParameters
-from tulip_ros import parameters, plan
+from tulip_ros import log_notes, parameters, plan
 from tulip_ros.errors import BadInputError
 from tulip_ros.log_file import Log
 from tulip_sim.match_rules import COLOUR_NAMES, NAMESPACES
@@ -22,8 +23,7 @@ from tulip_vision.pipeline import VisionParameters
 from tulip_worldmodel.worldmodel_node import WorldModelNodeParameters
 
 START = ("start_x", "start_y", "start_yaw")
-NOTE = "parameters"
-"""Name of the metadata that hold parameters: by full node name, a YAML text of each."""
+NODES = ("vision", "worldmodel", "strategy", "head", "game_input")
 
 Values = Mapping[str, Any]
 
@@ -35,15 +35,17 @@ class RobotParameters:
     Attributes:
         start: Where it was told to stand, or None where nobody noted it.
         field: As its team sees it.
+        forgotten: Names of parameters that the recording notes and today's components do not have.
     """
 
-    vision: VisionParameters = field(default_factory=VisionParameters)
-    worldmodel: WorldModelNodeParameters = field(default_factory=WorldModelNodeParameters)
-    strategy: StrategyNodeParameters = field(default_factory=StrategyNodeParameters)
-    head: HeadParameters = field(default_factory=HeadParameters)
-    game_input: GameInputParameters = field(default_factory=GameInputParameters)
+    vision: VisionParameters = dataclasses.field(default_factory=VisionParameters)
+    worldmodel: WorldModelNodeParameters = dataclasses.field(default_factory=WorldModelNodeParameters)
+    strategy: StrategyNodeParameters = dataclasses.field(default_factory=StrategyNodeParameters)
+    head: HeadParameters = dataclasses.field(default_factory=HeadParameters)
+    game_input: GameInputParameters = dataclasses.field(default_factory=GameInputParameters)
     start: Pose2D | None = None
-    field: Field = field(default_factory=load_field)
+    field: Field = dataclasses.field(default_factory=load_field)
+    forgotten: tuple[str, ...] = ()
 
 
 def parameters_of(log: Log, namespace: str, files: Sequence[Path] = ()) -> RobotParameters:
@@ -59,29 +61,28 @@ def parameters_of(log: Log, namespace: str, files: Sequence[Path] = ()) -> Robot
     Raises:
         BadInputError: if a file or a note cannot be used.
     """
-    values: dict[str, dict[str, Any]] = {}
+    values: dict[str, dict[str, Any]] = {name: {} for name in NODES}
     if namespace == NAMESPACES[1]:  # of a match's two robots the second attacks the other goal, in the other colour
-        plan.merge(values, {"worldmodel": {"field_turned": True}, "strategy": {"field_turned": True}})
-        plan.merge(values, {"vision": {"opponents": {"team_colour": COLOUR_NAMES[1]}}})
-    for layer in (noted(log), *(plan.as_parameters(plan.read_yaml(path) or {}, str(path), [namespace]) for path in files)):
-        for name in ("vision", "worldmodel", "strategy", "head", "game_input"):
-            for key in dict.fromkeys((plan.EVERY_NODE, name, f"{namespace}/{name}" if namespace else name)):
-                plan.merge(values.setdefault(name, {}), layer.get(key, {}))
-    flat = {name: flattened(block) for name, block in values.items()}
-    for block in flat.values():
-        block.pop("use_sim_time", None)
+        values["worldmodel"]["field_turned"] = values["strategy"]["field_turned"] = True
+        values["vision"]["opponents.team_colour"] = COLOUR_NAMES[1]
     defaults = RobotParameters()
-    start = None
-    if any(name in flat.get("worldmodel", {}) for name in START):
-        p = parameters.replace(defaults.worldmodel, flat["worldmodel"], "worldmodel")
-        start = Pose2D(p.start_x, p.start_y, p.start_yaw)
-    known = set(parameters.flatten(defaults.game_input))
-    flat["game_input"] = {key: value for key, value in flat.get("game_input", {}).items() if key in known}
-    made: dict[str, Any] = {
-        name: parameters.replace(getattr(defaults, name), flat.get(name, {}), name)
-        for name in ("vision", "worldmodel", "strategy", "head", "game_input")
-    }
-    return replace(defaults, **made, start=start, field=field_of(made["worldmodel"]))
+    recorded, forgotten = noted(log), []
+    for name in NODES:
+        known = parameters.flatten(getattr(defaults, name))
+        for key, value in recorded.get(f"{namespace}/{name}" if namespace else name, {}).items():
+            if key in known:
+                values[name][key] = value
+            elif name != "game_input":  # of its node only a part is needed here
+                forgotten.append(f"{name}.{key}")
+    for path in files:
+        layer = plan.as_parameters(plan.read_yaml(path) or {}, str(path), [namespace])
+        for name in NODES:
+            for key in dict.fromkeys((plan.EVERY_NODE, name, f"{namespace}/{name}" if namespace else name)):
+                values[name].update(flattened(layer.get(key, {})))
+    made: dict[str, Any] = {name: parameters.replace(getattr(defaults, name), values[name], name) for name in NODES}
+    p = made["worldmodel"]
+    start = Pose2D(p.start_x, p.start_y, p.start_yaw) if any(name in values["worldmodel"] for name in START) else None
+    return replace(defaults, **made, start=start, field=field_of(p), forgotten=tuple(forgotten))
 
 
 def field_of(p: WorldModelNodeParameters) -> Field:
@@ -98,21 +99,24 @@ def field_of(p: WorldModelNodeParameters) -> Field:
 
 
 def noted(log: Log) -> dict[str, dict[str, Any]]:
-    """Return the parameters that a recording notes, by full node name.
+    """Return the parameters that a recording's nodes had, by full node name, without those that are ROS's own.
 
     Raises:
-        BadInputError: if a note is no YAML.
+        BadInputError: if the recording's files of parameters are no YAML.
     """
-    found: dict[str, dict[str, Any]] = {}
-    for node, text in log.metadata.get(NOTE, {}).items():
-        try:
-            block = yaml.safe_load(text)
-        except yaml.YAMLError as error:
-            raise BadInputError(
-                f"Recording {log.path} notes parameters of node {node} that are no YAML; give them by --parameters."
-            ) from error
-        found[node.strip("/")] = block if isinstance(block, dict) else {}
-    return found
+    try:
+        found = log_notes.parameters_of(log)
+    except (yaml.YAMLError, ValueError, TypeError) as error:
+        raise BadInputError(
+            f"Recording {log.path} holds parameters that cannot be read ({error}); expected YAML, as record.py has it."
+        ) from error
+    return {
+        node: {name: value for name, value in block.items() if not _is_of_ros(name)} for node, block in found.items()
+    }
+
+
+def _is_of_ros(name: str) -> bool:
+    return name in parameters.ROS_NAMES or name.startswith("qos_overrides.")
 
 
 def flattened(block: Values, prefix: str = "") -> dict[str, Any]:

@@ -52,9 +52,7 @@ class VisionStage:
         self._own_body = OwnBody(self._robot)
         self._vision = self._make(head_camera_lens())
         self._vision.rehearse()
-        self._poses = PoseBuffer(
-            PoseBufferParameters(), partial(camera_in_footprint, self._robot, mount=load_mount())
-        )
+        self._poses = PoseBuffer(PoseBufferParameters(), partial(camera_in_footprint, self._robot, mount=load_mount()))
         self._pictures: deque[Heard] = deque()
         self._joints: Heard | None = None
         self._found: dict[int, Features] = {}

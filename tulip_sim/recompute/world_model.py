@@ -1,8 +1,8 @@
 """The world model, computed anew from recorded dead reckoning and features.
 
-A recorded world state documents on which inputs it was computed: its stamp is that of the newest odometry, `picture` that
-of the newest picture. Inputs are held back until a recorded state names them, so the order in which the node took them
-is that of the run, though a recorder that listens beside the nodes may have heard them in another one.
+A recorded world state documents on which inputs it was computed: its stamp is that of the newest odometry, `picture`
+that of the newest picture. Inputs are held back until a recorded state names them, so they are taken in the order of the
+run, though a recorder that listens beside the nodes may have heard them in another one.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections import Counter, deque
 from collections.abc import Iterator
 
 from tulip_description.field import Field
-from tulip_description.planar import Pose2D
+from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.interface import Odometry
 from tulip_motion.messages import odometry_from_message
 from tulip_ros import topics
@@ -28,7 +28,7 @@ from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
 
 ODOMETRY, FEATURES, START = topics.ODOMETRY.name, topics.FEATURES.name, topics.START_POSE.name
 STATE = topics.WORLD_STATE.name
-ROUNDED = 1e-9  # [m], [rad] by which a start pose that travelled as a quaternion may differ from the one that was meant
+ROUNDED = 1e-9  # [rad] by which a heading that travelled as a quaternion may differ from the one that was meant
 
 
 class WorldModelStage:
@@ -51,8 +51,7 @@ class WorldModelStage:
         self._features: deque[Features] = deque()
         self._asked: deque[Heard] = deque()
         self._model: WorldModel | None = None
-        self._start = start
-        self._moved = False  # a start pose came and no state was computed since
+        self._start, self._rounded = start, False
         self._newest = -1  # stamp of the newest odometry heard [ns]
         self._seen = -1  # stamp of the newest features heard [ns]
         self._counts: Counter[str] = Counter()
@@ -65,7 +64,7 @@ class WorldModelStage:
                 yield from self._answer_all(None)
                 self._odometry.clear()
                 self._features.clear()
-                self._start, self._model = pose, None
+                self._start, self._rounded, self._model = pose, True, None
             return
         if heard.name == ODOMETRY:
             odometry = odometry_from_message(heard.message)
@@ -124,10 +123,9 @@ class WorldModelStage:
         """Make the core where the robot was set down."""
         recorded = Pose2D(*(float(value) for value in first.message.robot_pose))
         start = self._start or recorded
-        # A start pose that is told as a message comes as a quaternion, which rounds its heading in the last digit.
-        difference = max(abs(a - b) for a, b in zip(start.as_array(), recorded.as_array(), strict=True))
-        if difference < ROUNDED:
-            start = recorded
+        # Told as a message it comes as a quaternion, which rounds the heading in its last digit.
+        if self._rounded and abs(wrap_angle(start.yaw - recorded.yaw)) < ROUNDED:
+            start = Pose2D(start.x, start.y, recorded.yaw)
         if self._start is None and picture_of(first) > 0:
             self._counts["begun in the middle of a run, where the world model knew more than a recording tells"] += 1
         self._model = WorldModel(self._parameters, self._field, start)
