@@ -1,7 +1,7 @@
 """Makes the recordings of tests/data/recordings anew: `python3 tests/make_recordings.py FOLDER`.
 
-Whole lockstep runs are recorded and then thinned out to what recomputing needs. Vision's features are those of the small
-JPEG pictures that are kept, computed when the recordings are made: a later run is compared with them.
+Whole lockstep runs are recorded and then thinned out to what recomputing needs. Vision's features are those of the
+small JPEG pictures that are kept, computed when the recordings are made: a later run is compared with them.
 """
 
 from __future__ import annotations

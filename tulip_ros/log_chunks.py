@@ -1,7 +1,7 @@
 """Messages of some topics of an MCAP file, in the order of time, several times faster than mcap's own reader.
 
-That one makes an object of each message in a chunk, wanted or not, and sorts them through a heap. Most readers want some
-topics of many: here what is not wanted is stepped over, and a chunk is sorted at once.
+That one makes an object of each message in a chunk, wanted or not, and sorts them through a heap. Most readers want
+some topics of many: here what is not wanted is stepped over, and a chunk is sorted at once.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ answers, features arrive some ticks after their picture.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -18,6 +19,7 @@ from tulip_description.camera_mount import load_mount
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.field import Field
 from tulip_description.planar import Pose2D
+from tulip_description.quaternion import pose_on_ground
 from tulip_description.robot_io import JointCommand
 from tulip_motion.head import HeadMovement, HeadParameters
 from tulip_motion.interface import HeadCommand, HeadMode, MotionState
@@ -156,7 +158,10 @@ class RobotStack:
 
     def told_to_stand_at(self, pose: Pose2D) -> None:
         """Forget where robot, ball and opponents are: the robot was put down at a pose in its own map."""
-        self.world_model = WorldModel(self._settings.worldmodel, self._field, pose)
+        # In the graph the pose comes as a quaternion, which rounds the heading in its last digit.
+        half = pose.yaw / 2.0
+        told = pose_on_ground((pose.x, pose.y), (0.0, 0.0, math.sin(half), math.cos(half)))
+        self.world_model = WorldModel(self._settings.worldmodel, self._field, told)
         self._tell("initialpose", self.world.stamp, pose)
 
     def close(self) -> None:

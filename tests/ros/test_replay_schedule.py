@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from rclpy.serialization import serialize_message
@@ -70,22 +71,17 @@ def test_a_start_beyond_the_end_and_topics_that_are_not_there_are_refused(record
     with Log(recording) as log:
         with pytest.raises(BadInputError, match=r"Start is 9\.0 s; recording .* is 1\.0 s long"):
             Passage(log, ["/motion_state"], 9.0, 0.0)
-        with pytest.raises(BadInputError, match="Nothing of .* its topics are /game_state, /motion_state"):
+        with pytest.raises(BadInputError, match=r"Nothing of .* its topics are /game_state, /motion_state"):
             Passage(log, [], 0.0, 0.0)
 
 
 def test_types_that_are_missing_or_have_changed_are_named():
-    class Topics:
-        topics = {
-            topic.name: topic
-            for topic in (
-                LoggedTopic("/a", "tulip_msgs/msg/GameState", schemas.definition("tulip_msgs/msg/GameState"), 1),
-                LoggedTopic("/b", "tulip_msgs/msg/GameState", "uint8 other\n", 1),
-                LoggedTopic("/c", "elsewhere_msgs/msg/Thing", "uint8 x\n", 1),
-            )
-        }
-
-    names, refused = playable(Topics)  # type: ignore[arg-type]
+    given = (
+        LoggedTopic("/a", "tulip_msgs/msg/GameState", schemas.definition("tulip_msgs/msg/GameState"), 1),
+        LoggedTopic("/b", "tulip_msgs/msg/GameState", "uint8 other\n", 1),
+        LoggedTopic("/c", "elsewhere_msgs/msg/Thing", "uint8 x\n", 1),
+    )
+    names, refused = playable(SimpleNamespace(topics={topic.name: topic for topic in given}))  # type: ignore[arg-type]
     assert names == ["/a"]
     assert "was another one" in refused["/b"] and "elsewhere_msgs/msg/Thing is not installed" in refused["/c"]
 
@@ -110,7 +106,7 @@ def test_messages_of_one_content_are_equal_once_their_gaps_are_cleared():
     message = MotionState(header=header(5, "odom"), phase=0.25, reason="turf", notes=["a", "bcd"])
     data = serialize_message(message)
     cleared = cdr.without_gaps("tulip_msgs/msg/MotionState", data)
-    # stamp 8, length 4, "odom\0" 5, mode 1, support 1: the gap before the phase is at 19 after the four bytes of the head
+    # stamp 8, length 4, "odom\0" 5, mode 1, support 1: the gap before the phase begins at 19, the head not counted
     spoilt = bytearray(data)
     spoilt[4 + 19 : 4 + 24] = b"12345"
     assert cdr.without_gaps("tulip_msgs/msg/MotionState", bytes(spoilt)) == cleared

@@ -70,7 +70,7 @@ def measure(components: str, pictures: str, seed: int, seconds: float) -> Row:
 def lines(rows: Sequence[Row]) -> list[str]:
     """Return the table in markdown, with the bars."""
     text = [
-        "| components | pictures | recorded [s] | times real time | of CPU time | with writing | messages equal | bar |",
+        "| components | pictures | recorded [s] | times real time | by CPU time | with writing | equal | bar |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for row in rows:

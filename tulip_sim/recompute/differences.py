@@ -215,4 +215,4 @@ MEASURES: dict[str, Callable[[Any, Any], dict[str, float]]] = {
     topics.BEHAVIOUR_TREE.name: _trees,
     topics.HEAD_JOINT_COMMAND.name: _joints,
 }
-"""What is measured between two messages that differ, by topic: names with units; those without are 0 or 1, or shares."""
+"""What is measured between two messages that differ, by topic: names with units; those without are 0, 1 or shares."""

@@ -1,8 +1,8 @@
 """The world model, computed anew from recorded dead reckoning and features.
 
 A recorded world state documents on which inputs it was computed: its stamp is that of the newest odometry, `picture`
-that of the newest picture. Inputs are held back until a recorded state names them, so they are taken in the order of the
-run, though a recorder that listens beside the nodes may have heard them in another one.
+that of the newest picture. Inputs are held back until a recorded state names them, so they are taken in the order of
+the run, though a recorder that listens beside the nodes may have heard them in another one.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections import Counter, deque
 from collections.abc import Iterator
 
 from tulip_description.field import Field
-from tulip_description.planar import Pose2D, wrap_angle
+from tulip_description.planar import Pose2D
 from tulip_motion.interface import Odometry
 from tulip_motion.messages import odometry_from_message
 from tulip_ros import topics
@@ -28,7 +28,6 @@ from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
 
 ODOMETRY, FEATURES, START = topics.ODOMETRY.name, topics.FEATURES.name, topics.START_POSE.name
 STATE = topics.WORLD_STATE.name
-ROUNDED = 1e-9  # [rad] by which a heading that travelled as a quaternion may differ from the one that was meant
 
 
 class WorldModelStage:
@@ -51,7 +50,7 @@ class WorldModelStage:
         self._features: deque[Features] = deque()
         self._asked: deque[Heard] = deque()
         self._model: WorldModel | None = None
-        self._start, self._rounded = start, False
+        self._start = start
         self._newest = -1  # stamp of the newest odometry heard [ns]
         self._seen = -1  # stamp of the newest features heard [ns]
         self._counts: Counter[str] = Counter()
@@ -64,7 +63,7 @@ class WorldModelStage:
                 yield from self._answer_all(None)
                 self._odometry.clear()
                 self._features.clear()
-                self._start, self._rounded, self._model = pose, True, None
+                self._start, self._model = pose, None
             return
         if heard.name == ODOMETRY:
             odometry = odometry_from_message(heard.message)
@@ -123,9 +122,6 @@ class WorldModelStage:
         """Make the core where the robot was set down."""
         recorded = Pose2D(*(float(value) for value in first.message.robot_pose))
         start = self._start or recorded
-        # Told as a message it comes as a quaternion, which rounds the heading in its last digit.
-        if self._rounded and abs(wrap_angle(start.yaw - recorded.yaw)) < ROUNDED:
-            start = Pose2D(start.x, start.y, recorded.yaw)
         if self._start is None and picture_of(first) > 0:
             self._counts["begun in the middle of a run, where the world model knew more than a recording tells"] += 1
         self._model = WorldModel(self._parameters, self._field, start)
