@@ -75,7 +75,7 @@ def parameters_of(log: Log, namespace: str, files: Sequence[Path] = ()) -> Robot
             elif name != "game_input":  # of its node only a part is needed here
                 forgotten.append(f"{name}.{key}")
     for path in files:
-        layer = plan.as_parameters(plan.read_yaml(path) or {}, str(path), [namespace])
+        layer = plan.as_parameters(plan.read_yaml(path) or {}, str(path), [namespace] if namespace else [])
         for name in NODES:
             for key in dict.fromkeys((plan.EVERY_NODE, name, f"{namespace}/{name}" if namespace else name)):
                 values[name].update(flattened(layer.get(key, {})))
