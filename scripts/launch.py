@@ -19,6 +19,7 @@ from rich.live import Live
 from tulip_ros import plan
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, unknown
 from tulip_ros.launch import Launcher
+from tulip_ros.log_file import Log
 from tulip_ros.monitor import Monitor
 from tulip_ros.nodes import ROBOT
 from tulip_ros.run import ComponentNode, session
@@ -34,6 +35,7 @@ def main(
     driver: Annotated[str, typer.Option(help="What stands for the body; 'none' for no driver.")] = "sim",
     namespace: Annotated[str, typer.Option(help="Namespace of the robot, as in 'striker'.")] = "",
     parameters: Annotated[list[Path] | None, typer.Option(help="YAML file `node: {name: value}`; repeatable.")] = None,
+    log: Annotated[Path | None, typer.Option(help="Recording that driver 'log' plays back.")] = None,
     record: Annotated[Path | None, typer.Option(help="Record all topics into this new folder.")] = None,
     transport: Annotated[str, typer.Option(help="auto, shared_memory or udp")] = "auto",
     logs: Annotated[Path | None, typer.Option(help="Folder for one log file a node.")] = None,
@@ -44,6 +46,11 @@ def main(
             raise unknown("transport", transport, TRANSPORTS)
         names = list(nodes or ROBOT) + (["recorder"] if record else [])
         values = {"recorder": {"path": str(record.absolute())}} if record else {}
+        if log is not None:
+            if driver != "log":
+                raise BadInputError(f"--log is for --driver log; the driver is {driver!r}.")
+            with Log(log):  # says what is wrong with it before anything starts
+                values["driver"] = {"file": str(log.absolute())}
         starts = plan.make_plan(names, None if driver == "none" else driver, namespace, parameters or (), values)
         keep_running(Launcher(starts, logs, transport), namespace)
     except BadInputError as error:

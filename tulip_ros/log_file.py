@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, BinaryIO
 
 import yaml
 from mcap.exceptions import McapError
@@ -22,6 +22,7 @@ from zstandard import ZstdError
 
 from tulip_ros import schemas
 from tulip_ros.errors import BadInputError
+from tulip_ros.log_chunks import messages_of
 
 MAGIC = b"\x89MCAP0\r\n"
 SHORTEST = 2 * len(MAGIC) + 29  # [B] with its end
@@ -101,6 +102,7 @@ class Log:
         self._decoders: dict[str, Any] = {}
         self._open = ExitStack()
         self._readers: list[tuple[SeekingReader, Summary]] = []
+        self._streams: list[BinaryIO] = []
         try:
             for file in self.files:
                 self._readers.append(self._open_file(file))
@@ -182,13 +184,17 @@ class Log:
             DamagedLogError: if the file turns out to be damaged on the way.
         """
         wanted = self.topics if names is None else {name: self.topics[name] for name in names if name in self.topics}
-        for number, (file, (reader, _)) in enumerate(zip(self.files, self._readers, strict=True)):
+        for number, (file, stream, (_, summary)) in enumerate(
+            zip(self.files, self._streams, self._readers, strict=True)
+        ):
             repeated = self._repeated[number]
+            channels = {key: wanted[each.topic] for key, each in summary.channels.items() if each.topic in wanted}
             try:
-                for _, channel, message in reader.iter_messages(list(wanted), starting_at=start, ending_before=end):
-                    if channel.topic in repeated and message.sequence <= repeated[channel.topic][1]:
+                for channel, sequence, log_time, data in messages_of(stream, summary, channels, start, end):
+                    topic = channels[channel]
+                    if topic.name in repeated and sequence <= repeated[topic.name][1]:
                         continue  # the file before had it
-                    yield Record(wanted[channel.topic], message.log_time, message.sequence, message.data)
+                    yield Record(topic, log_time, sequence, data)
             except DAMAGES as error:
                 raise DamagedLogError(file, f"is damaged ({error})") from error
 
@@ -231,6 +237,7 @@ class Log:
                 raise BadInputError(f"{file} is no MCAP file; expected a recording of `record.py` or `match.py`.")
             if file.stat().st_size < SHORTEST:
                 raise DamagedLogError(file, "is cut")
+            self._streams.append(stream)
             reader = SeekingReader(stream, validate_crcs=True)
             summary = reader.get_summary()
         except OSError as error:

@@ -267,6 +267,9 @@ STAND = Service("stand", Trigger, "user_input", "stand up straight")
 GO_LIMP = Service("limp", Trigger, "user_input", "legs without stiffness")
 START_RECORDING = Service("start_recording", StartRecording, "recorder", "begin a recording")
 STOP_RECORDING = Service("stop_recording", StopRecording, "recorder", "end the recording")
+PAUSE_REPLAY = Service("replay/pause", Trigger, "replay", "hold the replay; of the log driver, too")
+RESUME_REPLAY = Service("replay/resume", Trigger, "replay", "go on with the replay")
+STEP_REPLAY = Service("replay/step", Trigger, "replay", "hold the replay, and let one step of it pass")
 KICK = Service("kick", Kick, "motion", "action: kick the ball once, from standing or by a step of the walk")
 
 SERVICES: tuple[Service, ...] = (
@@ -280,6 +283,9 @@ SERVICES: tuple[Service, ...] = (
     SET_USER_COMMAND,
     START_RECORDING,
     STOP_RECORDING,
+    PAUSE_REPLAY,
+    RESUME_REPLAY,
+    STEP_REPLAY,
     KICK,
 )
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from tulip_description.field import load_field
 from tulip_description.planar import Pose2D
 from tulip_ros import log_notes
 from tulip_ros.log_notes import Notebook
 from tulip_sim.lockstep import Settings
+from tulip_sim.match_places import in_map_of
+from tulip_sim.match_referee import MatchReferee
 from tulip_sim.match_rules import NAMESPACES, TEAMS
 from tulip_sim.match_settings import MatchSettings
 from tulip_sim.parameters import WorldParameters
@@ -46,9 +49,12 @@ def explain_match(bag: Notebook, seed: int, settings: MatchSettings) -> None:
     """Note how a match is played. Arguments and errors as for `explain_trial`."""
     own = {"seed": str(seed), "striker": settings.striker, "keeper": settings.keeper, "robots": "2"}
     log_notes.explain(bag, {**OWN, **own})
+    places, _ = MatchReferee(settings.rules, load_field(), seed).places
     for team in TEAMS:
         turned = {"field_turned": team == 1}
-        _attach_robot(bag, f"{NAMESPACES[team]}/", settings.of_team(team), turned, turned)
+        start = in_map_of(team, places[team])
+        told = {"start_x": start.x, "start_y": start.y, "start_yaw": start.yaw}
+        _attach_robot(bag, f"{NAMESPACES[team]}/", settings.of_team(team), {**turned, **told}, turned)
     driver = {"striker": settings.striker, "keeper": settings.keeper, "rules": settings.rules}
     _attach_driver(bag, "driver", seed, settings.world, settings.of_team(0), driver)
 

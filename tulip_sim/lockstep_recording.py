@@ -21,9 +21,10 @@ from tulip_motion.messages import (
 )
 from tulip_ros import topics
 from tulip_ros.bag import Bag
+from tulip_ros.errors import unknown
 from tulip_ros.log_notes import Notebook
 from tulip_ros.topics import Topic
-from tulip_sim.messages import jpeg_to_message, report_to_message, truth_to_message
+from tulip_sim.messages import jpeg_to_message, png_to_message, report_to_message, truth_to_message
 from tulip_strategy.messages import (
     decision_to_message,
     game_state_to_message,
@@ -39,6 +40,8 @@ from tulip_worldmodel.messages import (
 )
 
 Messages = Iterable[tuple[Topic, Any]]
+PICTURES = {"jpeg": jpeg_to_message, "png": png_to_message}
+"""How pictures can be recorded: vision on a JPEG finds nearly the same as live, on a PNG exactly the same."""
 
 
 class LockstepRecording:
@@ -47,15 +50,19 @@ class LockstepRecording:
     Pictures go in compressed, as `camera/image_raw/compressed`; times are simulated times.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, pictures: str = "jpeg") -> None:
         """Begin a recording.
 
         Args:
             folder: New folder for it.
+            pictures: One of `PICTURES`.
 
         Raises:
-            BadInputError: if it cannot be written.
+            BadInputError: if it cannot be written, or there is no such kind of pictures.
         """
+        if pictures not in PICTURES:
+            raise unknown("kind of pictures", pictures, PICTURES)
+        compress = PICTURES[pictures]
         self._bag = Bag(folder)
         self.path = self._bag.path
         cells = np.array([foot.cells for foot in load_robot().feet])
@@ -63,7 +70,7 @@ class LockstepRecording:
             "sensors": lambda stamp, value: zip(
                 (topics.JOINT_STATES, topics.IMU, topics.FOOT_FORCES), sensors_to_messages(value, cells), strict=True
             ),
-            "camera/image_raw": lambda stamp, value: [(topics.CAMERA_COMPRESSED, jpeg_to_message(value, stamp))],
+            "camera/image_raw": lambda stamp, value: [(topics.CAMERA_COMPRESSED, compress(value, stamp))],
             "legs/joint_command": lambda stamp, value: [(topics.LEG_COMMAND, joint_command_to_message(value))],
             "head/joint_command": lambda stamp, value: [(topics.HEAD_JOINT_COMMAND, joint_command_to_message(value))],
             "features": lambda stamp, value: [(topics.FEATURES, features_to_message(value))],

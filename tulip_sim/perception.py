@@ -195,11 +195,11 @@ class Perception:
 
     def in_view(self, truth: Truth) -> tuple[Glimpse, ...]:
         """Return all that the camera sees at one instant."""
-        stand, links = scene_of(truth, self._body, self._keeper_colour)
-        uprights = self._posts + (self._poles if stand.poles else [])
-        balls = np.array([[*truth.ball_position, self._field.ball_radius]])
-        solids = Solids(stand.boxes, np.array(uprights).reshape(-1, 4), balls)
-        return tuple(self._things(_Scene(self._body.camera_in_map(links), solids, truth)))
+        return tuple(self._things(self._scene(truth)))
+
+    def ball_in_view(self, truth: Truth) -> bool:
+        """Return whether the camera sees the ball."""
+        return any(True for _ in self._ball(self._scene(truth)))
 
     def features(
         self, glimpses: tuple[Glimpse, ...], stamp: int, camera_in_footprint: Array, rng: np.random.Generator
@@ -223,6 +223,13 @@ class Perception:
             for _ in range(int(rng.poisson(rate))):
                 found += self._false(kinds, view, rng)
         return Features(stamp, view.position, view.coverage(), tuple(found))
+
+    def _scene(self, truth: Truth) -> _Scene:
+        stand, links = scene_of(truth, self._body, self._keeper_colour)
+        uprights = self._posts + (self._poles if stand.poles else [])
+        balls = np.array([[*truth.ball_position, self._field.ball_radius]])
+        solids = Solids(stand.boxes, np.array(uprights).reshape(-1, 4), balls)
+        return _Scene(self._body.camera_in_map(links), solids, truth)
 
     def _things(self, scene: _Scene) -> Iterator[Glimpse]:
         p, truth = self._parameters, scene.truth

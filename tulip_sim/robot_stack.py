@@ -6,6 +6,7 @@ answers, features arrive some ticks after their picture.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -18,6 +19,7 @@ from tulip_description.camera_mount import load_mount
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.field import Field
 from tulip_description.planar import Pose2D
+from tulip_description.quaternion import pose_on_ground
 from tulip_description.robot_io import JointCommand
 from tulip_motion.head import HeadMovement, HeadParameters
 from tulip_motion.interface import HeadCommand, HeadMode, MotionState
@@ -39,7 +41,10 @@ from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParamete
 from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
 
 Listener = Callable[[str, int, object], None]
-"""Is told everything that passes between components: topic name, stamp [ns], object."""
+"""Is told everything that passes between components: topic name, when it passes [ns], object.
+
+A picture alone is told late, with the time of its exposure: eyes beside this process give it back with its features.
+"""
 
 
 @dataclass(frozen=True)
@@ -120,15 +125,15 @@ class RobotStack:
 
     def tick(self) -> None:
         """Sense, see, decide, and give the commands that answer the tick before; the world has still to advance."""
-        tick, tell = self._tick, self._tell
+        tick, tell, now = self._tick, self._tell, self.world.stamp
         sensors = self.world.sensors(self._number)
         for command in self._pending:
             reason = self.world.apply(command, self._number)
             if reason:
                 self.refused.append(reason)
         self._pending = [self.motion.tick(sensors)]
-        tell("sensors", sensors.stamp, sensors)
-        tell("legs/joint_command", sensors.stamp, self._pending[0])
+        tell("sensors", now, sensors)
+        tell("legs/joint_command", now, self._pending[0])
         if tick % SLOW_TICKS == 0:
             self._slow(sensors.stamp, sensors.joint_positions[12:])
         if tick >= self._camera_phase:
@@ -153,7 +158,10 @@ class RobotStack:
 
     def told_to_stand_at(self, pose: Pose2D) -> None:
         """Forget where robot, ball and opponents are: the robot was put down at a pose in its own map."""
-        self.world_model = WorldModel(self._settings.worldmodel, self._field, pose)
+        # In the graph the pose comes as a quaternion, which rounds the heading in its last digit.
+        half = pose.yaw / 2.0
+        told = pose_on_ground((pose.x, pose.y), (0.0, 0.0, math.sin(half), math.cos(half)))
+        self.world_model = WorldModel(self._settings.worldmodel, self._field, told)
         self._tell("initialpose", self.world.stamp, pose)
 
     def close(self) -> None:
@@ -168,10 +176,11 @@ class RobotStack:
         self._poses.add_head(stamp, float(head_positions[0]), float(head_positions[1]))
         command = self.head.update(stamp, self._head_command, head_positions)
         self._pending.append(command)
-        self._tell("odometry", stamp, odometry)
-        self._tell("motion_state", stamp, (self.motion.state(), odometry.distance))
-        self._tell("head/joint_command", stamp, command)
-        self._tell_truth(stamp)
+        now = self.world.stamp
+        self._tell("odometry", now, odometry)
+        self._tell("motion_state", now, (self.motion.state(), odometry.distance))
+        self._tell("head/joint_command", now, command)
+        self._tell_truth(now)
 
     def _tell_truth(self, stamp: int) -> None:
         """Tell the listener what really is. For who judges."""
@@ -199,7 +208,7 @@ class RobotStack:
             self.world_model.add_features(features)
             if picture is not None:
                 self._tell("camera/image_raw", features.stamp, picture)
-            self._tell("features", features.stamp, features)
+            self._tell("features", now, features)
 
     def _decide(self, stamp: int) -> None:
         """Let strategy see the world and command the legs and the head."""
@@ -214,10 +223,11 @@ class RobotStack:
             reason = self.motion.start_kick(decision.kick)
             if reason:
                 self.refused.append(f"kick: {reason}")
-        self._tell("world_state", stamp, world)
-        self._tell("walk_command", stamp, decision.walk)
-        self._tell("head_command", stamp, decision.head)
-        self._tell("decision", stamp, decision)
+        now = self.world.stamp
+        self._tell("world_state", now, world)
+        self._tell("walk_command", now, decision.walk)
+        self._tell("head_command", now, decision.head)
+        self._tell("decision", now, decision)
         if self.strategy.tree.statuses != self._told_tree:
             self._told_tree = self.strategy.tree.statuses
-            self._tell("behaviour_tree", stamp, self.strategy.tree)
+            self._tell("behaviour_tree", now, self.strategy.tree)

@@ -71,7 +71,7 @@ def _run(seed: int, eyes_beside: bool = False) -> Run:
 
     def listen(topic: str, stamp: int, value: object) -> None:
         if topic == "features":
-            delays.add(trial.stamp - stamp)
+            delays.add(stamp - value.stamp)  # type: ignore[attr-defined]
         if topic == "ground_truth":
             value = value[0]  # type: ignore[index]  # without what the referee says
         told.append((topic, stamp, _bits(value)))

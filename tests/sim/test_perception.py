@@ -168,7 +168,7 @@ def test_lockstep_gives_features_after_the_latency_and_no_pictures(latency: floa
     def listen(topic: str, stamp: int, value: object) -> None:
         topics.add(topic)
         if topic == "features":
-            delays.append(trial.stamp - stamp)
+            delays.append(stamp - value.stamp)  # type: ignore[attr-defined]
 
     scenario = make_scenario("open", np.random.default_rng(1), FIELD)
     trial = Lockstep(scenario, 1, Settings(perception=PerceptionParameters(latency=latency)), listen)

@@ -1,0 +1,121 @@
+"""Makes the recordings of tests/data/recordings anew: `python3 tests/make_recordings.py FOLDER`.
+
+Whole lockstep runs are recorded and then thinned out to what recomputing needs. Vision's features are those of the
+small JPEG pictures that are kept, computed when the recordings are made: a later run is compared with them.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import CompressedImage
+
+from tulip_description.field import load_field
+from tulip_ros.log_edit import writing
+from tulip_ros.log_file import Log
+from tulip_ros.time import stamp_of
+from tulip_sim.lockstep import Lockstep, Settings
+from tulip_sim.lockstep_match import LockstepMatch
+from tulip_sim.lockstep_notes import explain_match, explain_trial
+from tulip_sim.lockstep_recording import LockstepRecording
+from tulip_sim.match_rules import NAMESPACES
+from tulip_sim.match_settings import MatchSettings
+from tulip_sim.messages import jpeg_to_message
+from tulip_sim.perception import PerceptionParameters
+from tulip_sim.recompute.heard import time_at
+from tulip_sim.recompute.run import recompute
+from tulip_sim.robot_stack import RobotSettings
+from tulip_sim.scenario import make_scenario
+
+SEED = 4
+QUALITY = 50  # of the pictures, of which every second one is kept
+EVERY_TRUTH = 3  # of which one is kept: a moment is judged by the truth nearest to it, 30 ms away at most
+WORLD = ("odometry", "features", "world_state", "ground_truth", "initialpose")
+STRATEGY = ("motion_state", "game_state", "user_command", "decision", "behaviour_tree")
+EYES = ("joint_states", "camera/image_raw/compressed")
+
+
+def trial(folder: Path, seconds: float, perception: PerceptionParameters | None) -> None:
+    """Record the beginning of a trial, all topics, with pictures that lose nothing."""
+    recorder = LockstepRecording(folder, "png")
+    scenario = make_scenario("trial", np.random.default_rng(SEED), load_field())
+    settings = Settings(perception=perception)
+    run = Lockstep(scenario, SEED, settings, recorder.write)
+    explain_trial(recorder.notebook, SEED, "trial", scenario.robot, settings, run.user.strategy)
+    while run.stamp < seconds * 1e9:
+        run.step()
+    run.close()
+    recorder.close()
+
+
+def match(folder: Path, seconds: float) -> None:
+    """Record the beginning of a match of two robots without pictures."""
+    recorder = LockstepRecording(folder)
+    robot = RobotSettings(perception=PerceptionParameters())
+
+    def listen(team: int, topic: str, stamp: int, value: object) -> None:
+        recorder.write(topic, stamp, value, NAMESPACES[team])
+
+    settings = MatchSettings(robots=(robot, robot))
+    explain_match(recorder.notebook, SEED, settings)
+    run = LockstepMatch(SEED, settings, listen)
+    while run.stamp < seconds * 1e9:
+        run.step()
+    run.close()
+    recorder.close()
+
+
+def thin(source: Path, folder: Path, names: tuple[str, ...]) -> None:
+    """Keep some topics: pictures as small JPEG, head angles at the odometry's instants alone."""
+    with Log(source) as log, writing(folder) as bag:
+        bag.copy_notes(log)
+        chosen = [full for full in log.topics if any(full.endswith(f"/{name}") for name in names)]
+        slow = {record.log_time for record in log.records(["/odometry"])}
+        counts: Counter[str] = Counter()
+        dropped: set[int] = set()  # stamps of pictures [ns]
+        for record in log.records(chosen):
+            name, data = record.topic.name, record.data
+            counts[name] += 1
+            if name.endswith("/joint_states") and record.log_time not in slow:
+                continue
+            if name.endswith("/ground_truth") and counts[name] % EVERY_TRUTH:
+                continue
+            if name.endswith("/compressed") and counts[name] % 2:
+                dropped.add(record.log_time)
+                continue
+            if name.endswith("/features") and time_at(data, 4) in dropped:
+                continue
+            if record.topic.name.endswith("/compressed"):
+                message = deserialize_message(data, CompressedImage)
+                picture = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
+                data = serialize_message(jpeg_to_message(picture, stamp_of(message), QUALITY))
+            bag.copy_topic(record.topic)
+            bag.write(record.topic.name, data, record.log_time)
+
+
+def make(target: Path, whole: Callable[[Path], None], names: tuple[str, ...], components: tuple[str, ...]) -> None:
+    """Make one recording."""
+    with tempfile.TemporaryDirectory() as temporary:
+        there = Path(temporary)
+        whole(there / "whole")
+        thin(there / "whole", there / "thin", names)
+        with Log(there / "thin") as log:
+            recompute(log, components, target, judge=False)
+
+
+def main(target: Path) -> None:
+    """Make all of them in a folder."""
+    make(target / "walk", lambda folder: trial(folder, 20.0, PerceptionParameters()), WORLD + STRATEGY, ("worldmodel",))
+    make(target / "match", lambda folder: match(folder, 12.0), WORLD, ("worldmodel",))
+    make(target / "pictures", lambda folder: trial(folder, 8.0, None), WORLD + EYES, ("vision", "worldmodel"))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

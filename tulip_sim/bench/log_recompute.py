@@ -1,0 +1,97 @@
+"""Part `recompute` of bench log: how many times faster than real time recorded runs are computed anew."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from tulip_description.field import load_field
+from tulip_ros.log_file import Log
+from tulip_sim.bench.runner import Row
+from tulip_sim.lockstep import Lockstep, Settings
+from tulip_sim.lockstep_notes import explain_trial
+from tulip_sim.lockstep_recording import LockstepRecording
+from tulip_sim.perception import PerceptionParameters
+from tulip_sim.recompute.run import recompute
+from tulip_sim.scenario import make_scenario
+
+TRIALS: tuple[tuple[str, str, int, float], ...] = (
+    ("worldmodel", "none", 1, 20.0),
+    ("worldmodel", "jpeg", 1, 20.0),
+    ("vision,worldmodel", "jpeg", 1, 20.0),
+    ("vision,worldmodel", "png", 1, 10.0),
+)
+"""Components, pictures in the recording ("none": made-up features), seed, length [s]."""
+BARS = {True: 3.0, False: 20.0}
+"""Times real time, with vision and without."""
+
+
+def measure(components: str, pictures: str, seed: int, seconds: float) -> Row:
+    """Record a trial's beginning in lockstep and compute components anew, once only comparing, once writing as well.
+
+    Args:
+        components: Joined by commas.
+        pictures: "jpeg", "png", or "none" for features made up from the truth.
+        seed: Of the trial.
+        seconds: Recorded time [s].
+    """
+    chosen = components.split(",")
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary) / "recorded"
+        _record(folder, pictures, seed, seconds)
+        with Log(folder) as log:
+            recompute(log, chosen, judge=False)  # compiles vision's loops, fills the system's cache
+            begin, cpu = time.perf_counter(), time.process_time()
+            outcome = recompute(log, chosen, judge=False)
+            compared, compared_cpu = time.perf_counter() - begin, time.process_time() - cpu
+            begin = time.perf_counter()
+            recompute(log, chosen, Path(temporary) / "recomputed", judge=False)
+            written = time.perf_counter() - begin
+            differences = outcome.differences.values()
+            return {
+                "part": "recompute",
+                "components": components,
+                "pictures": pictures,
+                "seed": seed,
+                "recorded_s": outcome.seconds,
+                "recording_mb": sum(path.stat().st_size for path in log.files) / 1e6,
+                "times_real_time_comparing": outcome.seconds / compared,
+                "times_real_time_by_cpu_time": outcome.seconds / compared_cpu,
+                "times_real_time_writing": outcome.seconds / written,
+                "messages": sum(each.recorded for each in differences),
+                "messages_equal": sum(each.equal for each in differences),
+            }
+
+
+def lines(rows: Sequence[Row]) -> list[str]:
+    """Return the table in markdown, with the bars."""
+    text = [
+        "| components | pictures | recorded [s] | times real time | by CPU time | with writing | equal | bar |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in rows:
+        bar = BARS["vision" in row["components"].split(",")]
+        text.append(
+            f"| {row['components'].replace(',', ', ')} | {row['pictures']} | {row['recorded_s']:.0f}"
+            f" | {row['times_real_time_comparing']:.1f} | {row['times_real_time_by_cpu_time']:.1f}"
+            f" | {row['times_real_time_writing']:.1f} | {row['messages_equal']} of {row['messages']} | {bar:.0f} |"
+        )
+    return text
+
+
+def _record(folder: Path, pictures: str, seed: int, seconds: float) -> None:
+    recording = LockstepRecording(folder, "jpeg" if pictures == "none" else pictures)
+    settings = Settings(perception=PerceptionParameters() if pictures == "none" else None)
+    scenario = make_scenario("trial", np.random.default_rng(seed), load_field())
+    trial = Lockstep(scenario, seed, settings, recording.write)
+    try:
+        explain_trial(recording.notebook, seed, "trial", scenario.robot, settings, trial.user.strategy)
+        while trial.stamp < seconds * 1e9:
+            trial.step()
+    finally:
+        trial.close()
+        recording.close()

@@ -1,0 +1,1 @@
+"""Today's cores on recorded inputs: what would the robot have seen, believed and decided?"""

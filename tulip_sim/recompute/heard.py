@@ -1,0 +1,106 @@
+"""What passes between a recording, the stages that recompute, and who compares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from struct import Struct
+from typing import Any, Protocol
+
+from tulip_ros.log_file import Log, Record
+from tulip_ros.time import NANOSECONDS
+
+UNIX_TIME = 10**17
+"""[ns] Log times below are simulated: a lockstep's. Those of a graph count from 1970."""
+OVERDUE = 1_000_000_000
+"""[ns] of log time after which an input that a recorded output names is taken for lost."""
+
+
+LITTLE, BIG = Struct("<iI"), Struct(">iI")
+
+
+@dataclass
+class Heard:
+    """A message as a recording holds it.
+
+    Attributes:
+        name: Of its topic, without the robot's namespace.
+        record: As recorded.
+        log: The recording, which decodes it.
+    """
+
+    name: str
+    record: Record
+    log: Log
+
+    @property
+    def log_time(self) -> int:
+        """When it was recorded [ns]."""
+        return self.record.log_time
+
+    @cached_property
+    def message(self) -> Any:
+        """The message."""
+        return self.log.decode(self.record)
+
+    @property
+    def stamp(self) -> int:
+        """Stamp [ns] of a message that begins with a header: the first eight bytes after those of the encoding."""
+        return time_at(self.record.data, 4)
+
+
+def time_at(data: bytes, place: int) -> int:
+    """Return the time [ns] at a place of a serialized message."""
+    seconds, nanoseconds = _order(data).unpack_from(data, place)
+    return int(seconds) * NANOSECONDS + int(nanoseconds)
+
+
+def after_header(data: bytes) -> int:
+    """Return the place of what follows the header with which a serialized message begins, at a multiple of 4."""
+    _, length = _order(data).unpack_from(data, 8)
+    return 16 + (int(length) + 3) // 4 * 4
+
+
+def _order(data: bytes) -> Struct:
+    return LITTLE if data[1] & 1 else BIG
+
+
+@dataclass(frozen=True)
+class Made:
+    """A message that was computed anew.
+
+    Attributes:
+        name: Of its topic, without the robot's namespace.
+        log_time: Of the recorded message in whose place it stands [ns].
+        stamp: Of its header [ns].
+        message: The message.
+    """
+
+    name: str
+    log_time: int
+    stamp: int
+    message: Any
+
+
+class Stage(Protocol):
+    """One component, computed anew."""
+
+    reads: frozenset[str]
+    """Names of the topics that it hears."""
+    writes: frozenset[str]
+    """Names of the topics that it says."""
+    told_by: frozenset[str]
+    """Those of `writes` whose recorded messages tell when to compute."""
+
+    def hear(self, heard: Heard | Made) -> Iterable[Made]:
+        """Take an input, as recorded or as an earlier stage made it."""
+
+    def answer(self, recorded: Heard) -> Iterable[Made]:
+        """Take a recorded output, which tells when the component spoke and on which inputs."""
+
+    def finish(self) -> Iterable[Made]:
+        """Yield what was still waited for when the recording ended."""
+
+    def shortcomings(self) -> dict[str, int]:
+        """Return what could not be computed, by reason."""

@@ -1,0 +1,151 @@
+"""How good recorded and recomputed estimates are, where the recording holds what really was."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from tulip_description.field import Field
+from tulip_description.planar import wrap_angle
+from tulip_description.robot import load_robot
+from tulip_ros import topics
+from tulip_ros.time import stamp_of
+from tulip_sim.messages import truth_from_message
+from tulip_sim.perception import Perception, PerceptionParameters
+from tulip_sim.recompute.heard import UNIX_TIME, Heard, Made
+from tulip_sim.truth import Truth
+from tulip_vision.features import FeatureClass
+from tulip_vision.lens import head_camera_lens
+
+NEAREST = 30_000_000  # [ns] between a moment and the truth that it is judged by; the truth comes at 50 Hz
+KEPT = 100  # truths: 2 s, longer than features take
+RANGE = 4.0  # [m] up to which a ball in the picture is expected to be found
+NEAR = math.radians(5.0)  # [rad] of azimuth within which a ball counts as found
+UPRIGHT = 0.5  # [rad] of the trunk's tilt up to which localization counts
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Estimates against the truth; NaN where there was nothing to judge.
+
+    Attributes:
+        position: RMS of the robot's estimated position while it is upright [m].
+        heading: The same of its heading [rad].
+        ball: Median error of the ball's estimated place, relative to the robot, while it is known [m].
+        ball_recall: Share of the pictures that show the ball whole within `RANGE`, in which it was found.
+        pictures_with_ball: How many pictures these are.
+        latency: Median time from a picture to its features, by simulated log times [s].
+    """
+
+    position: float = math.nan
+    heading: float = math.nan
+    ball: float = math.nan
+    ball_recall: float = math.nan
+    pictures_with_ball: int = 0
+    latency: float = math.nan
+
+    def as_dict(self) -> dict[str, float | None]:
+        """Return everything for JSON; what is not known is None."""
+        values = asdict(self)
+        return {name: None if math.isnan(value) else value for name, value in values.items()}
+
+
+class _Sums:
+    """Errors of one sort of estimates, as they come."""
+
+    def __init__(self) -> None:
+        self.position: list[float] = []
+        self.heading: list[float] = []
+        self.ball: list[float] = []
+        self.found: list[bool] = []
+        self.latency: list[float] = []
+
+    def judgement(self) -> Judgement:
+        def rms(values: list[float]) -> float:
+            return math.sqrt(float(np.mean(np.square(values)))) if values else math.nan
+
+        def median(values: list[float]) -> float:
+            return float(np.median(values)) if values else math.nan
+
+        recall = sum(self.found) / len(self.found) if self.found else math.nan
+        return Judgement(
+            rms(self.position), rms(self.heading), median(self.ball), recall, len(self.found), median(self.latency)
+        )
+
+
+class Judge:
+    """Judges one robot."""
+
+    reads = frozenset((topics.GROUND_TRUTH.name, topics.WORLD_STATE.name, topics.FEATURES.name))
+
+    def __init__(self, field: Field) -> None:
+        """Begin.
+
+        Args:
+            field: As the robot's team sees it.
+        """
+        parameters = PerceptionParameters(ball_range=RANGE)
+        self._perception = Perception(parameters, field, load_robot(), head_camera_lens())
+        self._truths: deque[tuple[int, Any]] = deque(maxlen=KEPT)
+        self._shows_ball: dict[int, bool] = {}
+        self._recorded, self._made = _Sums(), _Sums()
+        self._poles = bool(field.poles)
+
+    def take_recorded(self, heard: Heard) -> None:
+        """Take a recorded message."""
+        if heard.name == topics.GROUND_TRUTH.name:
+            self._truths.append((heard.stamp, heard))
+        elif heard.name in self.reads:
+            self._take(self._recorded, heard)
+
+    def take_made(self, made: Made) -> None:
+        """Take a recomputed message."""
+        if made.name in self.reads:
+            self._take(self._made, made)
+
+    def judgements(self) -> tuple[Judgement, Judgement]:
+        """Return the figures of what was recorded and of what was recomputed."""
+        return self._recorded.judgement(), self._made.judgement()
+
+    def _take(self, sums: _Sums, message: Heard | Made) -> None:
+        if message.name == topics.FEATURES.name and message.log_time < UNIX_TIME:
+            sums.latency.append((message.log_time - message.stamp) * 1e-9)
+        truth = self._truth(message.stamp)
+        if truth is None:
+            return
+        if message.name == topics.FEATURES.name:
+            self._judge_features(sums, message.message, truth)
+        else:
+            self._judge_state(sums, message.message, truth)
+
+    def _truth(self, stamp: int) -> Truth | None:
+        """Return the truth nearest to a stamp [ns]."""
+        if not self._truths:
+            return None
+        at, heard = min(self._truths, key=lambda entry: abs(entry[0] - stamp))
+        return truth_from_message(heard.message, self._poles) if abs(at - stamp) <= NEAREST else None
+
+    def _judge_state(self, sums: _Sums, state: Any, truth: Truth) -> None:
+        true = truth.footprint
+        x, y = truth.base_orientation[:2].tolist()
+        if 1.0 - 2.0 * (x * x + y * y) > math.cos(UPRIGHT):
+            sums.position.append(math.hypot(state.robot_pose[0] - true.x, state.robot_pose[1] - true.y))
+            sums.heading.append(wrap_angle(float(state.robot_pose[2]) - true.yaw))
+        if state.ball_known:
+            here = true.inverse().transform(truth.ball_position[:2])
+            sums.ball.append(math.hypot(state.ball.position[0] - here[0], state.ball.position[1] - here[1]))
+
+    def _judge_features(self, sums: _Sums, features: Any, truth: Truth) -> None:
+        stamp = stamp_of(features)
+        if stamp not in self._shows_ball:
+            self._shows_ball[stamp] = self._perception.ball_in_view(truth)
+        if not self._shows_ball[stamp]:
+            return
+        x, y = truth.footprint.inverse().transform(truth.ball_position[:2])
+        azimuth = math.atan2(y - features.camera_position[1], x - features.camera_position[0])
+        balls = (each.azimuth for each in features.features if each.kind == FeatureClass.BALL)
+        sums.found.append(any(abs(wrap_angle(each - azimuth)) < NEAR for each in balls))

@@ -1,0 +1,133 @@
+"""The world model, computed anew from recorded dead reckoning and features.
+
+A recorded world state documents on which inputs it was computed: its stamp is that of the newest odometry, `picture`
+that of the newest picture. Inputs are held back until a recorded state names them, so they are taken in the order of
+the run, though a recorder that listens beside the nodes may have heard them in another one.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Iterator
+
+from tulip_description.field import Field
+from tulip_description.planar import Pose2D
+from tulip_motion.interface import Odometry
+from tulip_motion.messages import odometry_from_message
+from tulip_ros import topics
+from tulip_sim.recompute.heard import OVERDUE, Heard, Made, after_header, time_at
+from tulip_vision.features import Features
+from tulip_worldmodel.messages import (
+    features_from_message,
+    map_to_odom_message,
+    robot_pose_to_message,
+    start_pose_from_message,
+    world_state_to_message,
+)
+from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
+
+ODOMETRY, FEATURES, START = topics.ODOMETRY.name, topics.FEATURES.name, topics.START_POSE.name
+STATE = topics.WORLD_STATE.name
+
+
+class WorldModelStage:
+    """Node worldmodel."""
+
+    reads = frozenset((ODOMETRY, FEATURES, START))
+    writes = frozenset((STATE, topics.ROBOT_POSE.name, topics.TF.name))
+    told_by = frozenset((STATE,))
+
+    def __init__(self, parameters: WorldModelParameters, field: Field, start: Pose2D | None) -> None:
+        """Wait for the first recorded state.
+
+        Args:
+            parameters: Of the core.
+            field: As the robot's team sees it.
+            start: Where the robot was told to stand; None: where the first recorded state has it.
+        """
+        self._parameters, self._field = parameters, field
+        self._odometry: deque[Odometry] = deque()
+        self._features: deque[Features] = deque()
+        self._asked: deque[Heard] = deque()
+        self._model: WorldModel | None = None
+        self._start = start
+        self._newest = -1  # stamp of the newest odometry heard [ns]
+        self._seen = -1  # stamp of the newest features heard [ns]
+        self._counts: Counter[str] = Counter()
+
+    def hear(self, heard: Heard | Made) -> Iterator[Made]:
+        """Hold an input until a recorded state names it."""
+        if heard.name == START:
+            pose = start_pose_from_message(heard.message)
+            if pose is not None:
+                yield from self._answer_all(None)
+                self._odometry.clear()
+                self._features.clear()
+                self._start, self._model = pose, None
+            return
+        if heard.name == ODOMETRY:
+            odometry = odometry_from_message(heard.message)
+            self._odometry.append(odometry)
+            self._newest = odometry.stamp
+        else:
+            features = features_from_message(heard.message)
+            self._features.append(features)
+            self._seen = features.stamp
+        yield from self._answer_all(heard.log_time)
+
+    def answer(self, recorded: Heard) -> Iterator[Made]:
+        """Compute the state anew as soon as its inputs are here."""
+        self._asked.append(recorded)
+        yield from self._answer_all(recorded.log_time)
+
+    def finish(self) -> Iterator[Made]:
+        """Yield the states whose inputs never came."""
+        yield from self._answer_all(None)
+
+    def shortcomings(self) -> dict[str, int]:
+        """Return what could not be computed as it was, by reason."""
+        return dict(self._counts)
+
+    def _answer_all(self, now: int | None) -> Iterator[Made]:
+        """Answer the recorded states whose inputs are here, and those that waited too long at log time `now` [ns]."""
+        while self._asked:
+            asked = self._asked[0]
+            stamp, picture = asked.stamp, picture_of(asked)
+            has_odometry, has_features = self._newest >= stamp, self._seen >= picture or picture == 0
+            if not (has_odometry and has_features):
+                if now is not None and now - asked.log_time < OVERDUE:
+                    return
+                if not has_odometry:
+                    self._counts["world states whose odometry is not recorded"] += 1
+                if not has_features:
+                    self._counts["world states whose features are not recorded"] += 1
+            self._asked.popleft()
+            yield from self._compute(asked, stamp, picture)
+
+    def _compute(self, asked: Heard, stamp: int, picture: int) -> Iterator[Made]:
+        model = self._model or self._begin(asked)
+        while self._odometry and self._odometry[0].stamp <= stamp:
+            model.add_odometry(self._odometry.popleft())
+        while self._features and self._features[0].stamp <= picture:
+            model.add_features(self._features.popleft())
+        world = model.state(stamp)
+        for name, message in (
+            (STATE, world_state_to_message(world)),
+            (topics.ROBOT_POSE.name, robot_pose_to_message(world)),
+            (topics.TF.name, map_to_odom_message(world)),
+        ):
+            yield Made(name, asked.log_time, world.stamp, message)
+
+    def _begin(self, first: Heard) -> WorldModel:
+        """Make the core where the robot was set down."""
+        recorded = Pose2D(*(float(value) for value in first.message.robot_pose))
+        start = self._start or recorded
+        if self._start is None and picture_of(first) > 0:
+            self._counts["begun in the middle of a run, where the world model knew more than a recording tells"] += 1
+        self._model = WorldModel(self._parameters, self._field, start)
+        return self._model
+
+
+def picture_of(state: Heard) -> int:
+    """Return the stamp of the newest picture used [ns], without decoding all of a recorded state."""
+    return time_at(state.record.data, after_header(state.record.data))
