@@ -1,0 +1,115 @@
+"""Estimates against truth over time, with the spread that the estimates claim."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tulip_ros import topics
+from tulip_view.columns import attitude
+from tulip_view.recording import Recording, Track
+from tulip_view.report.figures import BLUE, RED, SKY, Array, Band, Figure, LeftOut, Line, Section, thin
+from tulip_view.tables import Alignment, align
+
+TITLE = "Errors of the estimates"
+SIGMAS = 2.0
+WIDEST = 4.0  # of the greatest error: a band wider than that is cut by the axis at first, so that errors can be seen
+
+
+def errors(recording: Recording) -> Section:
+    """Return the section.
+
+    Raises:
+        LeftOut: if the recording holds no truth, or no world state.
+    """
+    truth, world = recording.get(topics.GROUND_TRUTH), recording.get(topics.WORLD_STATE)
+    if truth is None or world is None:
+        raise LeftOut(TITLE, f"{'ground_truth' if truth is None else 'world_state'} is not recorded")
+    real = _truth_at(truth, world.times)
+    section = Section("errors", TITLE, [f"Bands: {SIGMAS:g} sigma of the estimates' own covariances."])
+    section.header = ("estimate", "RMS error", "median", "greatest", f"within {SIGMAS:g} sigma (95 % expected)")
+    pose = world.gather("robot_pose")
+    spread = np.sqrt(np.maximum(world.gather("robot_covariance").reshape(-1, 3, 3).diagonal(axis1=1, axis2=2), 0.0))
+    difference = pose - real[:, :3]
+    difference[:, 2] = np.degrees(_wrap(difference[:, 2]))
+    spread[:, 2] = np.degrees(spread[:, 2])
+    for index, (axis, unit) in enumerate((("x", "m"), ("y", "m"), ("yaw", "deg"))):
+        _add(
+            section,
+            f"robot{axis}",
+            f"Robot's {axis} in the map",
+            unit,
+            world.times,
+            difference[:, index],
+            spread[:, index],
+        )
+    known = np.array([message.ball_known for message in world.messages])
+    if known.any():
+        ball, ball_spread = _ball(world, real, known)
+        for index, axis in enumerate(("forward", "left")):
+            name = f"Ball as seen from the robot, {axis}"
+            _add(section, f"ball{axis}", name, "m", world.times, ball[:, index], ball_spread[:, index])
+    else:
+        section.words.append("The robot never knew where the ball was.")
+    return section
+
+
+def _truth_at(truth: Track, times: Array) -> Array:
+    """Return (n, 5): robot's x, y, yaw and the ball's x, y in map, NaN where not known."""
+    rows = np.array(
+        [
+            (
+                m.robot.position.x,
+                m.robot.position.y,
+                attitude(m.robot.orientation)[2],
+                m.ball.position.x,
+                m.ball.position.y,
+            )
+            for m in truth.messages
+        ]
+    )
+    kinds = [Alignment.LINEAR, Alignment.LINEAR, Alignment.ANGLE, Alignment.LINEAR, Alignment.LINEAR]
+    return np.column_stack([align(truth, rows[:, index], kind, times) for index, kind in enumerate(kinds)])
+
+
+def _ball(world: Track, real: Array, known: Array) -> tuple[Array, Array]:
+    """Return (n, 2) errors of the ball in base_footprint, and what they should be; NaN where no ball is known."""
+    offset = real[:, 3:5] - real[:, :2]
+    cosine, sine = np.cos(real[:, 2]), np.sin(real[:, 2])
+    seen = np.column_stack([cosine * offset[:, 0] + sine * offset[:, 1], -sine * offset[:, 0] + cosine * offset[:, 1]])
+    found = np.array([message.ball.position for message in world.messages]) - seen
+    covariances = np.array([message.ball.covariance for message in world.messages]).reshape(-1, 4, 4)
+    spread = np.sqrt(np.maximum(covariances[:, [0, 1], [0, 1]], 0.0))
+    found[~known], spread[~known] = np.nan, np.nan
+    return found, spread
+
+
+def _add(section: Section, key: str, name: str, unit: str, times: Array, error: Array, spread: Array) -> None:
+    t, e, s = thin(times, error, SIGMAS * spread)
+    figure = Figure(f"error{key}", f"{name}: estimate - truth", "time [s]", f"error [{unit}]", height=210)
+    figure.items = [Band(f"{SIGMAS:g} sigma", t, -s, s, SKY), Line("error", t, e, BLUE)]
+    valid = np.isfinite(error)
+    if valid.any():
+        size = np.abs(error[valid])
+        greatest = float(size.max())
+        inside = float(np.mean(size <= SIGMAS * spread[valid]))
+        digits = 3 if unit == "m" else 2
+        section.rows.append(
+            (
+                name,
+                f"{np.sqrt(np.mean(size**2)):.{digits}f} {unit}",
+                f"{np.median(size):.{digits}f} {unit}",
+                f"{greatest:.{digits}f} {unit}",
+                f"{100.0 * inside:.0f} %",
+            )
+        )
+        widest = max(1.15 * greatest, min(float(np.nanpercentile(s, 90)) * 1.2, WIDEST * greatest), 1e-3)
+        figure.y_range = (-widest, widest)
+        outside = np.abs(e) > s
+        if outside.any():
+            figure.items.append(Line("outside", t, np.where(outside, e, np.nan), RED, points=True, width=3))
+    section.figures.append(figure)
+
+
+def _wrap(angle: Array) -> Array:
+    wrapped: Array = (angle + np.pi) % (2.0 * np.pi) - np.pi
+    return wrapped
