@@ -45,7 +45,7 @@ def field_paths(recording: Recording, field: Field) -> Section:
     if truth is None and world is None:
         raise LeftOut(TITLE, "neither ground_truth nor world_state is recorded")
     x, y = field.carpet_length / 2.0, field.carpet_width / 2.0
-    figure = Figure("field", "Paths in the map", "x [m]", "y [m]", equal=True, time=False, height=560)
+    figure = Figure("field", "Paths in the map", "x [m]", "y [m]", equal=True, time=False, height=760)
     figure.x_range, figure.y_range = (-x, x), (-y, y)
     figure.items += ground_lines(field)
     if truth is not None:
@@ -61,6 +61,10 @@ def field_paths(recording: Recording, field: Field) -> Section:
         figure.items.append(path("ball, truth", balls, ORANGE))
         if np.isfinite(keepers).any():
             figure.items.append(path("opponent, truth", keepers, PURPLE))
+        for places, colour in ((poses, BLACK), (balls, ORANGE), (keepers, PURPLE)):
+            known = places[np.isfinite(places).all(axis=1)]
+            if len(known):  # where the path ends; of somebody who stands still it is all that there is
+                figure.items.append(Line("", known[-1:, 0], known[-1:, 1], colour, points=True, width=9))
     if world is not None:
         estimate = np.array([m.robot_pose[:2] for m in world.messages])
         figure.items.append(path("robot, estimate", estimate, BLUE, dashed=True))
@@ -71,7 +75,9 @@ def field_paths(recording: Recording, field: Field) -> Section:
             (sx, sy) = thin(seen[:, 0], seen[:, 1], most=600)
             figure.items.append(Line("opponent, estimate", sx, sy, SKY, points=True, width=3))
         figure.items += _ellipses(world.times, world.messages)
-    words = [f"Ellipses: {SIGMAS:g} sigma of the estimates, every {ELLIPSE_PERIOD:g} s."] if world is not None else []
+    words = ["Dots: where the paths end."] if truth is not None else []
+    if world is not None:
+        words.append(f"Ellipses: {SIGMAS:g} sigma of the estimates, every {ELLIPSE_PERIOD:g} s.")
     return Section("fieldpaths", TITLE, words, [figure])
 
 

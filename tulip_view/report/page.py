@@ -14,6 +14,8 @@ from plotly.offline import get_plotlyjs
 from tulip_view.report.build import Report
 from tulip_view.report.figures import Array, Band, Figure, Line, Mark, Section, Span
 
+LETTER = 0.0065  # of the timeline's width that one letter takes
+LEAST_LETTERS = 4  # fewer do not tell a name
 EVEN = 1e-6  # [s or m] samples that lie this regularly need no x of their own
 
 
@@ -47,7 +49,7 @@ def draw(figure: Figure) -> dict[str, Any]:
     traces += _lanes(figure)
     layout: dict[str, Any] = {
         "height": figure.height,
-        "margin": {"l": 64, "r": 16, "t": 12, "b": 44},
+        "margin": {"l": 64, "r": 16, "t": 20, "b": 44},
         "xaxis": {"title": {"text": figure.x_label}, "zeroline": False, "gridcolor": "#e6e9ee"},
         "yaxis": {"title": {"text": figure.y_label}, "zeroline": False, "gridcolor": "#e6e9ee", "automargin": True},
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0},
@@ -112,8 +114,7 @@ def _lanes(figure: Figure) -> list[dict[str, Any]]:
                 "base": [span.begin for span in spans],
                 "x": [span.end - span.begin for span in spans],
                 "marker": {"color": [span.colour for span in spans], "line": {"width": 0.5, "color": "#ffffff"}},
-                # A name that has no room in its bar is told by the mouse alone.
-                "text": [s.label if (s.end - s.begin) / whole > 0.0075 * len(s.label) else "" for s in spans],
+                "text": [fitting(span.label, (span.end - span.begin) / whole) for span in spans],
                 "textposition": "inside",
                 "insidetextanchor": "middle",
                 "textangle": 0,
@@ -141,6 +142,14 @@ def _lanes(figure: Figure) -> list[dict[str, Any]]:
             }
         )
     return traces
+
+
+def fitting(label: str, share: float) -> str:
+    """Return as much of a name as fits into a bar that takes a share of the width; the mouse tells the rest."""
+    room = int(share / LETTER)
+    if len(label) <= room:
+        return label
+    return label[: room - 1].rstrip() + "…" if room >= LEAST_LETTERS else ""
 
 
 def _with_choice(trace: dict[str, Any], choice: str, figure: Figure) -> dict[str, Any]:

@@ -95,12 +95,17 @@ def _worth(message: Any) -> float:
 
 
 def _count(message: Any) -> list[str]:
+    """Return what was seen, in words: ball, 2 goal posts, ..."""
     kinds = [feature.kind for feature in message.features]
-    return [
-        f"{kinds.count(kind)} {name.replace('_', ' ')}" if kinds.count(kind) > 1 else name.replace("_", " ")
-        for kind, name in FEATURES.items()
-        if kind in kinds
-    ]
+    found = []
+    for kind, name in FEATURES.items():
+        number = kinds.count(kind)
+        words = name.replace("_", " ")
+        if name.startswith("crossing"):
+            words = f"{name[-1].upper()} crossing"
+        if number:
+            found.append(words if number == 1 else f"{number} {words}s")
+    return found
 
 
 def _head(recording: Recording, time: float) -> tuple[float, Array, float, float] | None:

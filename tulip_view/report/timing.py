@@ -100,14 +100,16 @@ def _latencies(recording: Recording, section: Section) -> None:
             continue
         stamps, arrivals = found
         latency = 1e3 * (arrivals - stamps)
+        if not latency.any():
+            continue  # lockstep tells it at its own stamp
         figure.items.append(Line(name, *thin(stamps, latency), colour))
         section.words.append(
             f"Picture to {name}: median {np.median(latency):.1f} ms, 95 % below {np.percentile(latency, 95):.1f} ms, "
             f"longest {latency.max():.1f} ms."
         )
     commands = recording.get(topics.LEG_COMMAND)
-    if commands is not None:
-        latency = 1e3 * (commands.arrivals - commands.times)
+    latency = np.zeros(0) if commands is None else 1e3 * (commands.arrivals - commands.times)
+    if commands is not None and latency.any():
         section.words.append(
             f"Joint state to leg command: median {np.median(latency):.1f} ms, 95 % below "
             f"{np.percentile(latency, 95):.1f} ms."
