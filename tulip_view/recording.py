@@ -43,6 +43,7 @@ STEADY = tuple(  # topics whose stamps go forward by themselves
     )
 )
 DATES = 10**15  # [ns] stamps beyond 12 days are dates
+SAME = 10**9  # [ns] a recorder that hears stamps no later than this after they were the present has the same clock
 STEP = 1000
 
 
@@ -98,7 +99,7 @@ class Recording:
         tracks: By the topics' names within the namespace; only those that hold messages.
         origin: Stamp at which the axis begins [ns].
         runs: How often time began anew in it, plus one; the tracks hold the longest run alone.
-        log_time_is_stamp: Whether the recorder's clock was that of the stamps, as in lockstep.
+        log_time_is_stamp: Whether the recorder's clock was that of the stamps, as in lockstep and on a robot.
         metadata: What the recorder noted.
     """
 
@@ -240,8 +241,8 @@ def _stamp(record: Record) -> int | None:
 
 
 def _assemble(log: Log, robot: str, run: dict[str, list[tuple[int | None, int, Any]]], runs: int) -> Recording:
-    clock = run.pop(CLOCK, [])
-    known = [(log_time, stamp) for stamp, log_time, _ in clock if stamp is not None]
+    known = _clock(run)
+    run.pop(CLOCK, None)
     stamps = [stamp for name in STEADY for stamp, _, _ in run.get(name, ()) if stamp is not None]
     first = min(stamps, default=log.span[0])
     origin = first if first > DATES else 0
@@ -250,10 +251,7 @@ def _assemble(log: Log, robot: str, run: dict[str, list[tuple[int | None, int, A
     tracks = {}
     for name, entries in run.items():
         logged = np.array([log_time - log.span[0] for _, log_time, _ in entries], dtype=float) * 1e-9
-        if known:
-            arrivals = np.interp(logged, clock_logged, clock_stamps)
-        else:
-            arrivals = logged + (log.span[0] - origin) * 1e-9
+        arrivals = np.interp(logged, clock_logged, clock_stamps) if known else logged
         own = [math.nan if stamp is None else (stamp - origin) * 1e-9 for stamp, _, _ in entries]
         times = np.where(np.isnan(own), arrivals, own)
         # Latched messages may carry stamps of long ago.
@@ -261,4 +259,16 @@ def _assemble(log: Log, robot: str, run: dict[str, list[tuple[int | None, int, A
         messages = [entries[index][2] for index in order if entries[index][2] is not None]
         tracks[name] = Track(times[order], arrivals[order], logged[order], messages)
     robots = robots_in(log)
-    return Recording(log.path, robot, robots, tracks, origin, runs, not known, log.metadata)
+    same = all(abs(log_time - stamp) < SAME for log_time, stamp in known)
+    return Recording(log.path, robot, robots, tracks, origin, runs, same, log.metadata)
+
+
+def _clock(run: dict[str, list[tuple[int | None, int, Any]]]) -> list[tuple[int, int]]:
+    """Return log times and stamps that belong together [ns]: of the clock, or of what comes most often without one."""
+    best: list[tuple[int, int]] = []
+    for name in (CLOCK, *STEADY):
+        pairs = [(log_time, stamp) for stamp, log_time, _ in run.get(name, ()) if stamp is not None]
+        if name == CLOCK and pairs:
+            return pairs
+        best = max(best, pairs, key=len)
+    return best

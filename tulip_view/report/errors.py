@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tulip_msgs.msg import GameState
 from tulip_ros import topics
 from tulip_view.columns import attitude
 from tulip_view.recording import Recording, Track
 from tulip_view.report.figures import BLUE, RED, SKY, Array, Band, Figure, LeftOut, Line, Section, thin
 from tulip_view.tables import Alignment, align
+
+Mask = NDArray[np.bool_]
 
 TITLE = "Errors of the estimates"
 SIGMAS = 2.0
@@ -25,8 +29,16 @@ def errors(recording: Recording) -> Section:
     if truth is None or world is None:
         raise LeftOut(TITLE, f"{'ground_truth' if truth is None else 'world_state'} is not recorded")
     real = _truth_at(truth, world.times)
+    play = _in_play(recording, world.times)
     section = Section("errors", TITLE, [f"Bands: {SIGMAS:g} sigma of the estimates' own covariances."])
-    section.header = ("estimate", "RMS error", "median", "greatest", f"within {SIGMAS:g} sigma (95 % expected)")
+    if play.all():
+        section.words.append("The recording does not tell when the game was played: all of it counts as play.")
+    else:
+        section.words.append(
+            "At first the diagrams show as much as is needed for the errors in play; a double click shows all."
+        )
+    within = f"within {SIGMAS:g} sigma (95 % expected)"
+    section.header = ("estimate", "RMS error in play", "median", "greatest", within, "RMS error at all times")
     pose = world.gather("robot_pose")
     spread = np.sqrt(np.maximum(world.gather("robot_covariance").reshape(-1, 3, 3).diagonal(axis1=1, axis2=2), 0.0))
     difference = pose - real[:, :3]
@@ -47,7 +59,7 @@ def errors(recording: Recording) -> Section:
         ball, ball_spread = _ball(world, real, known)
         for index, axis in enumerate(("forward", "left")):
             name = f"Ball as seen from the robot, {axis}"
-            _add(section, f"ball{axis}", name, "m", world.times, ball[:, index], ball_spread[:, index])
+            _add(section, f"ball{axis}", name, "m", world.times, ball[:, index], ball_spread[:, index], play)
     else:
         section.words.append("The robot never knew where the ball was.")
     return section
@@ -83,31 +95,46 @@ def _ball(world: Track, real: Array, known: Array) -> tuple[Array, Array]:
     return found, spread
 
 
-def _add(section: Section, key: str, name: str, unit: str, times: Array, error: Array, spread: Array) -> None:
+def _add(
+    section: Section, key: str, name: str, unit: str, times: Array, error: Array, spread: Array, play: Mask
+) -> None:
     t, e, s = thin(times, error, SIGMAS * spread)
     figure = Figure(f"error{key}", f"{name}: estimate - truth", "time [s]", f"error [{unit}]", height=210)
     figure.items = [Band(f"{SIGMAS:g} sigma", t, -s, s, SKY), Line("error", t, e, BLUE)]
-    valid = np.isfinite(error)
-    if valid.any():
-        size = np.abs(error[valid])
-        greatest = float(size.max())
-        inside = float(np.mean(size <= SIGMAS * spread[valid]))
+    known = np.isfinite(error)
+    counted = known & play if (known & play).any() else known
+    if known.any():
+        size, claimed = np.abs(error[counted]), SIGMAS * spread[counted]
         digits = 3 if unit == "m" else 2
+        figures = (_rms(size), float(np.median(size)), float(size.max()))
         section.rows.append(
             (
                 name,
-                f"{np.sqrt(np.mean(size**2)):.{digits}f} {unit}",
-                f"{np.median(size):.{digits}f} {unit}",
-                f"{greatest:.{digits}f} {unit}",
-                f"{100.0 * inside:.0f} %",
+                *(f"{each:.{digits}f} {unit}" for each in figures),
+                f"{100.0 * float(np.mean(size <= claimed)):.0f} %",
+                f"{_rms(error[known]):.{digits}f} {unit}",
             )
         )
-        widest = max(1.15 * greatest, min(float(np.nanpercentile(s, 90)) * 1.2, WIDEST * greatest), 1e-3)
+        widest = max(1.15 * figures[2], min(1.2 * float(np.percentile(claimed, 90)), WIDEST * figures[2]), 1e-3)
         figure.y_range = (-widest, widest)
         outside = np.abs(e) > s
         if outside.any():
             figure.items.append(Line("outside", t, np.where(outside, e, np.nan), RED, points=True, width=3))
     section.figures.append(figure)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def _in_play(recording: Recording, times: Array) -> Mask:
+    """Return (n,) whether the game was played and the robot not penalised; all true where nobody tells."""
+    game = recording.get(topics.GAME_STATE)
+    if game is None:
+        return np.ones(len(times), dtype=bool)
+    playing = np.array([m.phase == GameState.PLAYING and not m.penalty for m in game.messages], dtype=float)
+    found: Mask = align(game, playing, Alignment.LAST, times) > 0.5
+    return found if found.any() else np.ones(len(times), dtype=bool)
 
 
 def _wrap(angle: Array) -> Array:

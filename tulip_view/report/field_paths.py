@@ -112,10 +112,9 @@ def ground_lines(field: Field) -> list[Line]:
 
 def path(name: str, points: Array, colour: str, dashed: bool = False) -> Line:
     """Return a path, (n, 2) [m], with gaps where it jumps."""
-    if len(points) > 1:
-        points = points.copy()
-        points[1:][np.linalg.norm(np.diff(points, axis=0), axis=1) > JUMP] = np.nan
-    x, y = thin(points[:, 0], points[:, 1], most=3000)
+    x, y = (values.copy() for values in thin(points[:, 0], points[:, 1], most=3000))
+    jumps = np.flatnonzero(np.hypot(np.diff(x), np.diff(y)) > JUMP) + 1
+    x[jumps], y[jumps] = np.nan, np.nan
     return Line(name, x, y, colour, dashed=dashed, width=2.0)
 
 

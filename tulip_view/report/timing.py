@@ -7,7 +7,7 @@ import numpy as np
 from tulip_ros import topics
 from tulip_ros.time import from_message
 from tulip_view.recording import Recording, Track
-from tulip_view.report.figures import BLACK, BLUE, GREEN, ORANGE, Array, Figure, LeftOut, Line, Section, thin
+from tulip_view.report.figures import BLUE, GREEN, ORANGE, Array, Figure, LeftOut, Line, Section, thin
 
 TITLE = "Time"
 WINDOW = 1.0  # [s] of the recorder's clock, over which the real-time factor is a mean
@@ -92,14 +92,13 @@ def _latencies(recording: Recording, section: Section) -> None:
     features, world = recording.get(topics.FEATURES), recording.get(topics.WORLD_STATE)
     figure = Figure("latency", "From a picture's stamp to ...", "time [s]", "latency [ms]", height=240)
     for name, found, colour in (
-        ("the picture itself", None if pictures is None else (pictures.times, pictures.arrivals), BLACK),
-        ("its features", None if features is None else (features.times, features.arrivals), BLUE),
+        ("its features", None if features is None else (features.times, features.wall), BLUE),
         ("the world state with them", None if world is None else _first_with_picture(recording, world), ORANGE),
     ):
         if found is None or not len(found[0]):
             continue
-        stamps, arrivals = found
-        latency = 1e3 * (arrivals - stamps)
+        stamps, wall = found
+        latency = 1e3 * (wall - _said(recording, stamps))
         if not latency.any():
             continue  # lockstep tells it at its own stamp
         figure.items.append(Line(name, *thin(stamps, latency), colour))
@@ -108,7 +107,7 @@ def _latencies(recording: Recording, section: Section) -> None:
             f"longest {latency.max():.1f} ms."
         )
     commands = recording.get(topics.LEG_COMMAND)
-    latency = np.zeros(0) if commands is None else 1e3 * (commands.arrivals - commands.times)
+    latency = np.zeros(0) if commands is None else 1e3 * (commands.wall - _said(recording, commands.times))
     if commands is not None and latency.any():
         section.words.append(
             f"Joint state to leg command: median {np.median(latency):.1f} ms, 95 % below "
@@ -121,7 +120,10 @@ def _latencies(recording: Recording, section: Section) -> None:
         section.figures.append(control)
     if figure.items:
         section.figures.append(figure)
-        section.words.append("Latencies are counted in the time of the stamps, as the recorder heard the messages.")
+        section.words.append(
+            "Latencies are by the recorder's clock, from when it heard the joint states of a stamp; where it hears "
+            "messages out of their order, one may come out below 0."
+        )
     if pictures is not None and features is not None:
         lost = len(np.setdiff1d(_nanoseconds(pictures.times), _nanoseconds(features.times)))
         section.words.append(f"Pictures without features: {lost} of {len(pictures)}.")
@@ -131,13 +133,24 @@ def _latencies(recording: Recording, section: Section) -> None:
         section.words.append(f"Features that no recorded world state names as its newest: {lost} of {len(features)}.")
 
 
+def _said(recording: Recording, stamps: Array) -> Array:
+    """Return when stamps were the present, by the recorder's clock [s].
+
+    The joint states tell it best: no other topic is as frequent, and they are sent the moment they are measured.
+    """
+    joints = recording.get(topics.JOINT_STATES)
+    track = joints if joints is not None else max(recording.tracks.values(), key=len)
+    said: Array = np.interp(stamps, track.times, track.wall)
+    return said
+
+
 def _first_with_picture(recording: Recording, world: Track) -> tuple[Array, Array]:
     """Return stamps of pictures, and when the first world state came that had used each [s]."""
     first: dict[int, float] = {}
-    for arrival, message in zip(world.arrivals, world.messages, strict=True):
+    for wall, message in zip(world.wall, world.messages, strict=True):
         stamp = from_message(message.picture)
         if stamp:
-            first.setdefault(stamp, float(arrival))
+            first.setdefault(stamp, float(wall))
     stamps = np.array([(stamp - recording.origin) * 1e-9 for stamp in first])
     return stamps, np.array(list(first.values()))
 
