@@ -24,6 +24,7 @@ from tulip_view.recording import choose_robot, expected_messages, read
 from tulip_view.table_files import check_target, files_of, write_table
 from tulip_view.tables import LONGEST_GAP, make_table, native_times, regular_times, sources_of, topics_of
 
+RATE = 50.0  # [Hz] of the rows, where nothing else is said: that of the control cycle's messages
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 
 
@@ -56,7 +57,11 @@ def main(
                 task = bar.add_task("reading", total=expected_messages(log, chosen, wanted))
                 recording = read(log, chosen, wanted, lambda number: bar.advance(task, number))
                 bar.update(task, description="aligning", total=None)
-                times = regular_times(recording, rate or 50.0) if native is None else native_times(recording, native)
+                times = (
+                    regular_times(recording, RATE if rate is None else rate)
+                    if native is None
+                    else native_times(recording, native)
+                )
                 table = make_table(recording, sources, times)
                 if len(table.columns) == 1:
                     raise BadInputError(

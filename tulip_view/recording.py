@@ -252,7 +252,7 @@ def _assemble(log: Log, robot: str, run: dict[str, list[tuple[int | None, int, A
     for name, entries in run.items():
         logged = np.array([log_time - log.span[0] for _, log_time, _ in entries], dtype=float) * 1e-9
         arrivals = np.interp(logged, clock_logged, clock_stamps) if known else logged
-        own = [math.nan if stamp is None else (stamp - origin) * 1e-9 for stamp, _, _ in entries]
+        own = [math.nan if stamp is None else (stamp - origin) / 1e9 for stamp, _, _ in entries]
         times = np.where(np.isnan(own), arrivals, own)
         # Latched messages may carry stamps of long ago.
         order = np.argsort(times, kind="stable")

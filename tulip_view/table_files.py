@@ -113,8 +113,7 @@ def _write_matlab(table: Table, path: Path) -> None:
         content[column.name] = values.reshape(-1, 1)
         about[number] = [column.name, column.unit, origin, column.alignment.value]
     content["columns"] = about
-    with open(path, "wb") as file:
-        savemat(file, content, do_compression=True, long_field_names=True)
+    savemat(str(path), content, appendmat=False, do_compression=True, long_field_names=True)
 
 
 def is_matlab_name(name: str) -> bool:

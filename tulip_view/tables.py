@@ -82,7 +82,8 @@ def regular_times(recording: Recording, rate: float) -> Array:
     count = (recording.end - recording.begin) * rate
     if count > MOST_ROWS:
         raise BadInputError(f"--rate {rate:g} Hz makes {count:.0f} rows; expected at most {MOST_ROWS}. Choose less.")
-    return recording.begin + np.arange(int(count + 1e-6) + 1) / rate
+    # Whole nanoseconds, as stamps are: an instant that is that of a message is exactly so.
+    return np.round(recording.begin + np.arange(int(count + 1e-6) + 1) / rate, 9)
 
 
 def native_times(recording: Recording, topic: str) -> Array:

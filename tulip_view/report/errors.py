@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from tulip_msgs.msg import GameState
 from tulip_ros import topics
-from tulip_view.columns import attitude
+from tulip_view.columns import Alignment, attitude
 from tulip_view.recording import Recording, Track
 from tulip_view.report.figures import BLUE, RED, SKY, Array, Band, Figure, LeftOut, Line, Section, thin
-from tulip_view.tables import Alignment, align
+from tulip_view.tables import align
 
 Mask = NDArray[np.bool_]
 
@@ -32,7 +32,7 @@ def errors(recording: Recording) -> Section:
     play = _in_play(recording, world.times)
     section = Section("errors", TITLE, [f"Bands: {SIGMAS:g} sigma of the estimates' own covariances."])
     if play.all():
-        section.words.append("The recording does not tell when the game was played: all of it counts as play.")
+        section.words.append("All of the recording counts as play: it was, or the recording does not tell.")
     else:
         section.words.append(
             "At first the diagrams show as much as is needed for the errors in play; a double click shows all."
@@ -53,6 +53,7 @@ def errors(recording: Recording) -> Section:
             world.times,
             difference[:, index],
             spread[:, index],
+            play,
         )
     known = np.array([message.ball_known for message in world.messages])
     if known.any():
@@ -83,7 +84,7 @@ def _truth_at(truth: Track, times: Array) -> Array:
     return np.column_stack([align(truth, rows[:, index], kind, times) for index, kind in enumerate(kinds)])
 
 
-def _ball(world: Track, real: Array, known: Array) -> tuple[Array, Array]:
+def _ball(world: Track, real: Array, known: Mask) -> tuple[Array, Array]:
     """Return (n, 2) errors of the ball in base_footprint, and what they should be; NaN where no ball is known."""
     offset = real[:, 3:5] - real[:, :2]
     cosine, sine = np.cos(real[:, 2]), np.sin(real[:, 2])

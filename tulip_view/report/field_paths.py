@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -133,7 +134,7 @@ def ellipse(centre: Array, covariance: Array) -> Array | None:
     return points
 
 
-def _ellipses(times: Array, messages: list[object]) -> list[Line]:
+def _ellipses(times: Array, messages: list[Any]) -> list[Line]:
     robots: list[Array] = []
     balls: list[Array] = []
     gap = np.full((1, 2), np.nan)
@@ -142,12 +143,12 @@ def _ellipses(times: Array, messages: list[object]) -> list[Line]:
         if time < due:
             continue
         due = time + ELLIPSE_PERIOD
-        pose = np.asarray(message.robot_pose, dtype=float)  # type: ignore[attr-defined]
-        covariance = np.asarray(message.robot_covariance).reshape(3, 3)  # type: ignore[attr-defined]
+        pose = np.asarray(message.robot_pose, dtype=float)
+        covariance = np.asarray(message.robot_covariance).reshape(3, 3)
         found = ellipse(pose[:2], covariance[:2, :2])
         robots += [found, gap] if found is not None else []
-        if message.ball_known:  # type: ignore[attr-defined]
-            ball = message.ball  # type: ignore[attr-defined]
+        if message.ball_known:
+            ball = message.ball
             turn = Pose2D(0.0, 0.0, float(pose[2])).rotation()
             spread = turn @ np.asarray(ball.covariance).reshape(4, 4)[:2, :2] @ turn.T
             found = ellipse(np.asarray(ball.position_in_map, dtype=float), spread)

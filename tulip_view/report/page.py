@@ -12,11 +12,10 @@ import numpy as np
 from plotly.offline import get_plotlyjs
 
 from tulip_view.report.build import Report
-from tulip_view.report.figures import Array, Band, Figure, Line, Mark, Section, Span
+from tulip_view.report.figures import Band, Figure, Line, Mark, Section, Span
 
 LETTER = 0.0065  # of the timeline's width that one letter takes
 LEAST_LETTERS = 4  # fewer do not tell a name
-EVEN = 1e-6  # [s or m] samples that lie this regularly need no x of their own
 
 
 def make_page(report: Report) -> str:
@@ -81,7 +80,7 @@ def _line(line: Line, figure: Figure) -> dict[str, Any]:
         "showlegend": bool(line.name),
         "hoverinfo": "skip" if not line.name else "x+y+name",
         "y": packed(line.y),
-        **_place(line.x, figure),
+        "x": packed(line.x),
     }
     if line.points:
         trace["marker"] = {"color": line.colour, "size": line.width, "opacity": 0.6}
@@ -94,7 +93,7 @@ def _line(line: Line, figure: Figure) -> dict[str, Any]:
 
 
 def _band(band: Band, figure: Figure) -> list[dict[str, Any]]:
-    common = {"type": "scatter", "mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", **_place(band.x, figure)}
+    common = {"type": "scatter", "mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "x": packed(band.x)}
     lower = {**common, "y": packed(band.low), "showlegend": False}
     upper = {**common, "y": packed(band.high), "name": band.name, "fill": "tonexty", "fillcolor": band.colour + "44"}
     return [_with_choice(lower, band.choice, figure), _with_choice(upper, band.choice, figure)]
@@ -157,15 +156,6 @@ def _with_choice(trace: dict[str, Any], choice: str, figure: Figure) -> dict[str
         trace["meta"] = choice
         trace["visible"] = choice == figure.choices[0]
     return trace
-
-
-def _place(x: Array, figure: Figure) -> dict[str, Any]:
-    """Return the x of a trace: begin and step where that is all there is to say."""
-    if figure.time and len(x) > 2:
-        steps = np.diff(x)
-        if np.ptp(steps) < EVEN:
-            return {"x0": float(x[0]), "dx": float((x[-1] - x[0]) / (len(x) - 1))}
-    return {"x": packed(x)}
 
 
 def packed(values: Any) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -90,7 +91,7 @@ def replay(recording: Recording, robot: Robot, field: Field) -> Section:
 
 def _columns(
     track: Track,
-    rows: list[tuple[float, ...]],
+    rows: Sequence[tuple[float, ...]],
     times: Array,
     kinds: tuple[Alignment, ...] = (LINEAR, LINEAR, LINEAR),
 ) -> NDArray[np.float32]:

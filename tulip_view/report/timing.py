@@ -101,7 +101,8 @@ def _latencies(recording: Recording, section: Section) -> None:
         latency = 1e3 * (wall - _said(recording, stamps))
         if not latency.any():
             continue  # lockstep tells it at its own stamp
-        figure.items.append(Line(name, *thin(stamps, latency), colour))
+        x, y = thin(stamps, latency)
+        figure.items.append(Line(name, x, y, colour))
         section.words.append(
             f"Picture to {name}: median {np.median(latency):.1f} ms, 95 % below {np.percentile(latency, 95):.1f} ms, "
             f"longest {latency.max():.1f} ms."
@@ -116,7 +117,8 @@ def _latencies(recording: Recording, section: Section) -> None:
         control = Figure(
             "control", "From a joint state's stamp to the leg command", "time [s]", "latency [ms]", height=210
         )
-        control.items.append(Line("leg command", *thin(commands.times, latency), GREEN))
+        x, y = thin(commands.times, latency)
+        control.items.append(Line("leg command", x, y, GREEN))
         section.figures.append(control)
     if figure.items:
         section.figures.append(figure)
