@@ -11,11 +11,12 @@ function floats(base64) {
 
 // Figures -------------------------------------------------------------------------------------------------------------
 const settings = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
-let sharing = false;
+let sharing = false, shownRange = null;
 
 function drawFigure(key) {
   const figure = content.figures[key];
   const plot = document.getElementById("figure-" + key);
+  if (figure.time && shownRange !== null) figure.layout.xaxis.range = shownRange;
   Plotly.newPlot(plot, figure.traces, figure.layout, settings);
   plot.dataset.drawn = "yes";
   if (!figure.time) return;
@@ -31,10 +32,11 @@ function drawFigure(key) {
 // All diagrams of time show the same piece of it.
 function shareRange(source, change) {
   if (sharing) return;
-  const begin = change["xaxis.range[0]"], end = change["xaxis.range[1]"];
+  const [begin, end] = change["xaxis.range"] || [change["xaxis.range[0]"], change["xaxis.range[1]"]];
   const all = change["xaxis.autorange"] === true;
   if (begin === undefined && !all) return;
   sharing = true;
+  shownRange = all ? null : [begin, end];
   const wanted = all ? { "xaxis.autorange": true } : { "xaxis.range": [begin, end] };
   Promise.all(timePlots.filter((each) => each.plot !== source).map((each) => Plotly.relayout(each.plot, wanted)))
     .finally(() => { sharing = false; placeCursors(); });

@@ -117,6 +117,7 @@ def _lanes(figure: Figure) -> list[dict[str, Any]]:
                 "textposition": "inside",
                 "insidetextanchor": "middle",
                 "textangle": 0,
+                "constraintext": "none",
                 "textfont": {"color": "#ffffff", "size": 11},
                 "customdata": [f"{s.label}<br>{s.begin:.2f} s to {s.end:.2f} s" for s in spans],
                 "hovertemplate": "%{customdata}<extra></extra>",
