@@ -52,11 +52,9 @@ class Wanted:
     """How much of a topic is read.
 
     Attributes:
-        period: Least time between the stamps of two messages [ns]; the others are left out.
         decoded: Whether the messages themselves are wanted, and not only their times.
     """
 
-    period: int = 0
     decoded: bool = True
 
 
@@ -181,7 +179,6 @@ def read(log: Log, robot: str, wanted: Mapping[str, Wanted], advance: Advance = 
     names = _full_names(log, robot, wanted)
     runs: list[dict[str, list[tuple[int | None, int, Any]]]] = [{}]
     timeline = Timeline()
-    last_kept: dict[str, int] = {}
     stamped = {full: _begins_with_stamp(log.topics[full]) for full in names}
     for number, record in enumerate(log.records(list(names)), 1):
         if number % STEP == 0:
@@ -194,12 +191,7 @@ def read(log: Log, robot: str, wanted: Mapping[str, Wanted], advance: Advance = 
                 continue
             if arrival is Arrival.ANEW:
                 runs.append({})
-                last_kept.clear()
         how = wanted.get(name, ALL)
-        instant = record.log_time if stamp is None else stamp
-        if how.period and instant < last_kept.get(name, -how.period) + how.period:
-            continue
-        last_kept[name] = instant
         message = log.decode(record) if how.decoded else None
         runs[-1].setdefault(name, []).append((stamp, record.log_time, message))
     longest = max(runs, key=lambda run: sum(map(len, run.values())))
