@@ -1,0 +1,1 @@
+"""The report of one recording: what happened, as a page, a PDF and pictures."""

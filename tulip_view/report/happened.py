@@ -1,0 +1,171 @@
+"""What happened: states of the game, decisions, kicks, falls, and what the referee said."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from tulip_ros import topics
+from tulip_view.columns import MODES, PHASES, SECONDARY, name_of
+from tulip_view.recording import Recording, Track
+from tulip_view.report.figures import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    RED,
+    SKY,
+    Figure,
+    LeftOut,
+    Mark,
+    Section,
+    Span,
+    spans_of,
+)
+
+TITLE = "What happened"
+PHASE_COLOURS = {"initial": GREY, "ready": SKY, "set": ORANGE, "playing": GREEN, "finished": PURPLE, "penalised": RED}
+MODE_COLOURS = {"limp": GREY, "stand": SKY, "walk": GREEN, "kick": ORANGE, "fallen": RED}
+PALETTE = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED, "#b3a000", "#7f5539", GREY)
+WRAPPERS = ("until it succeeds",)
+"""Nodes of the tree that say nothing about what the robot does."""
+
+Event = tuple[float, str, str]
+"""Time [s], who says it, what."""
+
+
+def happened(recording: Recording) -> Section:
+    """Return the section.
+
+    Raises:
+        LeftOut: if none of the topics is in the recording that tell anything of it.
+    """
+    end = recording.end
+    items: list[Span | Mark] = []
+    events: list[Event] = []
+    for add in (_game, _decisions, _motion, _truth, _referee):
+        spans, found = add(recording, end)
+        items += spans
+        events += found
+    if not items and not events:
+        raise LeftOut(TITLE, "none of game_state, decision, motion_state, ground_truth and referee/report is recorded")
+    events.sort(key=lambda event: event[0])
+    section = Section("happened", TITLE)
+    if items:
+        lanes = list(dict.fromkeys(item.lane for item in items))
+        figure = Figure("timeline", "Timeline", "time [s]", "", list(items), height=90 + 46 * len(lanes))
+        figure.x_range = (recording.begin, end)
+        section.figures.append(figure)
+    section.header = ("time [s]", "from", "what")
+    section.rows = [(f"{time:.2f}", who, what) for time, who, what in events]
+    return section
+
+
+def doing(tree: str) -> str:
+    """Return what a behaviour tree's active path comes down to: its last telling name."""
+    names = [name for name in tree.split(" > ") if name not in WRAPPERS]
+    return names[-1] if names else ""
+
+
+def _game(recording: Recording, end: float) -> tuple[list[Span | Mark], list[Event]]:
+    track = recording.get(topics.GAME_STATE)
+    if track is None:
+        return [], []
+    labels, events = [], []
+    before: tuple[Any, ...] = ()
+    for time, message in zip(track.times, track.messages, strict=True):
+        phase = name_of(PHASES, message.phase)
+        labels.append("penalised" if message.penalty else phase)
+        now = (phase, message.penalty, message.own_score, message.opponent_score, message.stopped, message.stale)
+        if now != before:
+            what = f"{phase}, {message.own_score}:{message.opponent_score}, {message.seconds_remaining} s left"
+            what += f", {name_of(SECONDARY, message.secondary_state).replace('_', ' ')}"
+            what += f", penalty {message.penalty}" if message.penalty else ""
+            what += ", stopped" if message.stopped else ""
+            what += ", no packets from the referee" if message.stale else ""
+            events.append((float(time), "game", what))
+        before = now
+    return [*spans_of("game", track.times, labels, end, PHASE_COLOURS)], events
+
+
+def _decisions(recording: Recording, end: float) -> tuple[list[Span | Mark], list[Event]]:
+    track = recording.get(topics.DECISION)
+    if track is None:
+        return [], []
+    labels = [doing(message.tree) for message in track.messages]
+    ranked = sorted(set(labels), key=lambda label: -labels.count(label))
+    colours = {label: PALETTE[index % len(PALETTE)] for index, label in enumerate(ranked)}
+    items: list[Span | Mark] = [*spans_of("decision", track.times, labels, end, colours)]
+    events = []
+    for time, message in zip(track.times, track.messages, strict=True):
+        if message.kick_requested:
+            what = (
+                f"kick asked for: {('left', 'right')[min(message.kick_side, 1)]} foot, "
+                f"{('forward', 'side', 'walking')[min(message.kick_kind, 2)]}, "
+                f"{np.degrees(message.kick_direction):.0f} deg, {message.kick_speed:.1f} m/s"
+            )
+            items.append(Mark("decision", what, float(time), RED))
+            events.append((float(time), "strategy", what))
+    return items, events
+
+
+def _motion(recording: Recording, end: float) -> tuple[list[Span | Mark], list[Event]]:
+    track = recording.get(topics.MOTION_STATE)
+    if track is None:
+        return [], []
+    labels = [name_of(MODES, message.mode) for message in track.messages]
+    spans = spans_of("motion", track.times, labels, end, MODE_COLOURS)
+    events = [
+        (span.begin, "motion", f"{span.label} for {span.end - span.begin:.2f} s")
+        for span in spans
+        if span.label in ("kick", "fallen", "limp")
+    ]
+    return [*spans], events
+
+
+def _truth(recording: Recording, end: float) -> tuple[list[Span | Mark], list[Event]]:
+    track = recording.get(topics.GROUND_TRUTH)
+    if track is None:
+        return [], []
+    items: list[Span | Mark] = []
+    events = []
+    for name, what, colour in (
+        ("touches", "touch of the ball", BLUE),
+        ("falls", "fall", RED),
+        ("own_score", "goal", GREEN),
+        ("opponent_score", "goal of the opponent", PURPLE),
+    ):
+        for time in _increments(track, name):
+            items.append(Mark("truth", what, time, colour))
+            events.append((time, "truth", what))
+    outcomes = [(float(time), each.outcome) for time, each in zip(track.times, track.messages, strict=True)]
+    for (_, old), (time, new) in pairwise(outcomes):
+        if new and new != old:
+            events.append((time, "referee", f"outcome: {new}"))
+    return items, events
+
+
+def _increments(track: Track, name: str) -> list[float]:
+    values = track.gather(name).astype(int)
+    return [float(time) for time in track.times[1:][np.diff(values) > 0]]
+
+
+def _referee(recording: Recording, end: float) -> tuple[list[Span | Mark], list[Event]]:
+    track = recording.get(topics.REPORT)
+    if track is None:
+        return [], []
+    try:
+        lines = json.loads(track.messages[-1].data)["log"]
+        found = [(float(line["time"]), f"{line['text']} ({line['score'][0]}:{line['score'][1]})") for line in lines]
+    except (ValueError, KeyError, TypeError, IndexError):
+        return [], [
+            (float(track.times[-1]), "referee", f"a report that cannot be read: {track.messages[-1].data[:60]}")
+        ]
+    return (
+        [Mark("referee", text, time, BLUE) for time, text in found],
+        [(time, "referee", text) for time, text in found],
+    )
