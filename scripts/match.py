@@ -21,8 +21,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
+from tulip_ros.picture_rate import PICTURE_RATE, PictureRate
 from tulip_ros.recorder_node import PICTURES
 from tulip_sim.lockstep import Settings
+from tulip_sim.lockstep_recording import KINDS, RecordedPictures
 from tulip_sim.match_graph import play_graph
 from tulip_sim.match_lockstep import play_lockstep
 from tulip_sim.match_rules import MatchRules
@@ -60,8 +62,14 @@ def main(
         typer.Option(help="camera (pictures and vision), or features made up from the truth: degraded or ideal"),
     ] = "camera",
     pictures: Annotated[
-        str, typer.Option(help=f"The camera's pictures in the recording: {', '.join(PICTURES)} (graph).")
+        str,
+        typer.Option(
+            help=f"The cameras' pictures in the recording: {', '.join(PICTURES)}; in lockstep {', '.join(KINDS)}."
+        ),
     ] = "compressed",
+    picture_rate: Annotated[
+        float, typer.Option(help="Pictures of each camera in a second of the recording; 0 for all.")
+    ] = PICTURE_RATE,
     teams: Annotated[
         int, typer.Option(help="1 for a trial against a figure, 2 for a match of two robots.", min=1, max=2)
     ] = 1,
@@ -88,11 +96,12 @@ def main(
             raise BadInputError(f"--eyes is {eyes!r}; expected one of {', '.join(EYES)}.")
         if mode != "graph" and (parameters or logs):
             raise BadInputError("--parameters and --logs are for nodes; expected --mode graph with them.")
-        if pictures not in PICTURES:
-            raise BadInputError(f"--pictures is {pictures!r}; expected one of {', '.join(PICTURES)}.")
-        if mode != "graph" and pictures != "compressed":
-            raise BadInputError("--pictures is for --mode graph; in lockstep pictures are recorded compressed.")
-        own = {"recorder": {"pictures": pictures}}
+        kinds = tuple(PICTURES) if mode == "graph" else KINDS
+        if pictures not in kinds:
+            raise BadInputError(f"--pictures is {pictures!r}; expected one of {', '.join(kinds)} in mode {mode}.")
+        PictureRate(picture_rate)
+        own = {"recorder": {"pictures": pictures, "picture_rate": picture_rate}}
+        recorded = RecordedPictures(pictures, picture_rate)
         if teams == 2:
             match = match_settings(trials, playing_time, striker, keeper, EYES[eyes])
             if mode == "graph" and EYES[eyes] is not None:
@@ -101,7 +110,7 @@ def main(
             check_writable(json_path, "--json")
         folder = None if no_record else record or default_folder(seed, mode if teams == 1 else f"match_{mode}")
         if teams == 2:
-            result = play_match(seed, mode, match, folder, parameters or (), own, referee_port, logs, console)
+            result = play_match(seed, mode, match, folder, recorded, parameters or (), own, referee_port, logs, console)
             report(result.report.verdict, result, console)
             if json_path is not None:
                 json_path.write_text(json.dumps(result.as_dict(), indent=2) + "\n")
@@ -136,8 +145,8 @@ def main(
             else:
                 beside = (os.cpu_count() or 1) > 1 and EYES[eyes] is None
                 settings = Settings(perception=EYES[eyes])
-                summary = play_lockstep(seed, scenario, settings, folder, show, beside, striker)
-    except BadInputError as error:
+                summary = play_lockstep(seed, scenario, settings, folder, show, beside, striker, recorded)
+    except (BadInputError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from None
     except KeyboardInterrupt:
@@ -177,6 +186,7 @@ def play_match(
     mode: str,
     settings: MatchSettings,
     folder: Path | None,
+    recorded: RecordedPictures,
     parameters: Sequence[Path],
     values: Mapping[str, Mapping[str, Any]],
     referee_port: int,
@@ -201,7 +211,7 @@ def play_match(
             plan = match_plan(seed, rules, folder, parameters, values, ports, settings.striker, settings.keeper)
             return play_match_graph(plan, seed, folder, show, say, logs)
         beside = (os.cpu_count() or 1) > 1 and all(robot.perception is None for robot in settings.robots)
-        return play_lockstep_match(seed, settings, folder, show, say, eyes_beside=beside)
+        return play_lockstep_match(seed, settings, folder, show, say, eyes_beside=beside, recorded=recorded)
 
 
 def report(verdict: str, summary: TrialSummary | MatchSummary, console: Console) -> None:

@@ -16,7 +16,7 @@ def main() -> int:
     from tulip_strategy import menu_node
 
     def menu(namespace: str = typer.Option("", help="Namespace of the robot, as in /striker.")) -> None:
-        """Tell the robot what to do: start, stop, stand, walk test, kick test, limp, strategy."""
+        """Tell the robot what to do: start, stop, stand, walk test, kick test, limp, strategy, record."""
         try:
             namespace = check_namespace(namespace)
             remap = ["-r", f"__ns:=/{namespace}"] if namespace else []

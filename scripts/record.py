@@ -14,13 +14,17 @@ from typing import Annotated
 import typer
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
+from tulip_ros.picture_rate import PICTURE_RATE
 from tulip_ros.plan import check_namespace
 from tulip_ros.recorder_node import PICTURES, RecorderNode, RecorderParameters
 from tulip_ros.run import run
 
 
 def main(
-    path: Annotated[Path | None, typer.Argument(help="New folder for the recording; none: recordings/DATE.")] = None,
+    path: Annotated[
+        Path | None,
+        typer.Argument(help="New folder for the recording, or with --wait for several; none: recordings/DATE."),
+    ] = None,
     include: Annotated[
         list[str] | None, typer.Option(help="Regular expression of whole topic names; repeatable.")
     ] = None,
@@ -30,18 +34,26 @@ def main(
     pictures: Annotated[
         str, typer.Option(help=f"The cameras' pictures: {', '.join(PICTURES)}. Raw ones take 14 MB a second each.")
     ] = "compressed",
+    picture_rate: Annotated[
+        float, typer.Option(help="Pictures of each camera in a second of the recording; 0 for all.")
+    ] = PICTURE_RATE,
     split_size: Annotated[float, typer.Option(help="MB after which the next file is begun; 0 for one file.")] = 0.0,
     split_time: Annotated[float, typer.Option(help="Seconds after which the next file is begun; 0: never.")] = 0.0,
+    wait: Annotated[
+        bool, typer.Option("--wait", help="Begin when the menu, or the service start_recording, says so.")
+    ] = False,
     namespace: Annotated[str, typer.Option(help="Namespace of the robot, as in 'striker'.")] = "",
 ) -> None:
     """Record all topics, or those that match."""
     try:
         namespace = check_namespace(namespace)
         settings = RecorderParameters(
-            path=str(path) if path else "",
+            **({"folder" if wait else "path": str(path)} if path else {}),
+            start=not wait,
             include=tuple(include or ()),
             exclude=tuple(exclude or ()),
             pictures=pictures,
+            picture_rate=picture_rate,
             split_size=split_size,
             split_time=split_time,
         )

@@ -24,7 +24,7 @@ from tulip_ros.time import stamp_of
 from tulip_sim.lockstep import Lockstep, Settings
 from tulip_sim.lockstep_match import LockstepMatch
 from tulip_sim.lockstep_notes import explain_match, explain_trial
-from tulip_sim.lockstep_recording import LockstepRecording
+from tulip_sim.lockstep_recording import LockstepRecording, RecordedPictures
 from tulip_sim.match_rules import NAMESPACES
 from tulip_sim.match_settings import MatchSettings
 from tulip_sim.messages import jpeg_to_message
@@ -44,7 +44,7 @@ EYES = ("joint_states", "camera/image_raw/compressed")
 
 def trial(folder: Path, seconds: float, perception: PerceptionParameters | None) -> None:
     """Record the beginning of a trial, all topics, with pictures that lose nothing."""
-    recorder = LockstepRecording(folder, "png")
+    recorder = LockstepRecording(folder, RecordedPictures("png", 0.0))
     scenario = make_scenario("trial", np.random.default_rng(SEED), load_field())
     settings = Settings(perception=perception)
     run = Lockstep(scenario, SEED, settings, recorder.write)

@@ -15,6 +15,7 @@ from tulip_description import frames
 from tulip_description.planar import Pose2D
 from tulip_description.robot import JOINTS
 from tulip_description.robot_io import JointCommand, Sensors
+from tulip_description.short_numbers import fixed_point
 from tulip_motion.interface import (
     HeadCommand,
     HeadMode,
@@ -34,6 +35,8 @@ from tulip_ros.time import header, stamp_of
 
 Array = NDArray[np.float64]
 JOINT_NAMES = list(JOINTS)
+FINE, COARSE = 16, 12
+"""Binary digits after the point: of lengths and angles (0.015 mm), of speeds and torques (0.0002 rad/s, N m)."""
 
 
 def sensors_to_messages(sensors: Sensors, cell_positions: Array) -> tuple[JointState, Imu, FootForces]:
@@ -64,7 +67,7 @@ def sensors_to_messages(sensors: Sensors, cell_positions: Array) -> tuple[JointS
 
 def _centre(cells: Array, positions: Array) -> Array:
     total = float(cells.sum())
-    return cells @ positions / total if total > 1.0 else np.full(2, np.nan)
+    return fixed_point(cells @ positions / total, FINE) if total > 1.0 else np.full(2, np.nan)
 
 
 def sensors_from_messages(joints: JointState, imu: Imu, forces: FootForces) -> Sensors:
@@ -94,9 +97,9 @@ def joint_command_to_message(command: JointCommand) -> JointCommandMessage:
         header=header(command.stamp),
         sequence=command.sequence,
         names=list(command.names),
-        position=command.position.tolist(),
-        velocity=command.velocity.tolist(),
-        effort=command.effort.tolist(),
+        position=fixed_point(command.position, FINE).tolist(),
+        velocity=fixed_point(command.velocity, COARSE).tolist(),
+        effort=fixed_point(command.effort, COARSE).tolist(),
         stiffness=command.stiffness.tolist(),
         damping=command.damping.tolist(),
     )
@@ -219,23 +222,13 @@ def _transform(
     return message
 
 
-_STATE_ARRAYS = (
-    "com",
-    "com_desired",
-    "com_velocity",
-    "com_velocity_desired",
-    "dcm",
-    "dcm_desired",
-    "zmp",
-    "zmp_desired",
-    "joint_positions",
-    "joint_positions_desired",
-    "joint_velocities",
-    "joint_velocities_desired",
-    "torque_feedback",
-    "torque_feedforward",
-    "torque_learned",
-)
+_STATE_ARRAYS = {
+    **dict.fromkeys(("com", "com_desired", "com_velocity", "com_velocity_desired"), FINE),
+    **dict.fromkeys(("dcm", "dcm_desired", "zmp", "zmp_desired", "joint_positions", "joint_positions_desired"), FINE),
+    **dict.fromkeys(("joint_velocities", "joint_velocities_desired"), COARSE),
+    **dict.fromkeys(("torque_feedback", "torque_feedforward", "torque_learned"), COARSE),
+}
+"""How many binary digits of each go into a message."""
 
 
 def motion_state_to_message(state: MotionState, distance: float) -> MotionStateMessage:
@@ -246,12 +239,12 @@ def motion_state_to_message(state: MotionState, distance: float) -> MotionStateM
         support=int(state.support),
         phase=state.phase,
         step_count=state.step_count,
-        left_sole=state.soles[0].ravel(),
-        right_sole=state.soles[1].ravel(),
+        left_sole=fixed_point(state.soles[0].ravel(), FINE),
+        right_sole=fixed_point(state.soles[1].ravel(), FINE),
         distance=distance,
         reason=state.reason,
         notes=list(state.notes),
-        **{name: getattr(state, name) for name in _STATE_ARRAYS},
+        **{name: fixed_point(getattr(state, name), digits) for name, digits in _STATE_ARRAYS.items()},
     )
 
 

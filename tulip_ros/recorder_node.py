@@ -19,7 +19,9 @@ from tulip_ros.bag import FREE, Bag, Split
 from tulip_ros.errors import BadInputError
 from tulip_ros.lost_messages import LostMessages
 from tulip_ros.node_parameters import ParameterAsker
+from tulip_ros.picture_rate import PICTURE_RATE, PictureRate
 from tulip_ros.run import ComponentNode, run
+from tulip_ros.time import serialized_stamp
 from tulip_ros.topics import Quality
 
 LOOK = 0.5  # [s] between two looks for new topics and nodes, and at the disk
@@ -33,6 +35,7 @@ PICTURES = {
     "none": (r"/(.*/)?camera/image_raw", r"/(.*/)?camera/image_raw/compressed", r"/(.*/)?vision/picture"),
 }
 """Which topics each choice of pictures leaves out."""
+PICTURE = re.compile(r"/(.*/)?(camera/image_raw(/compressed)?|vision/picture)")
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,8 @@ class RecorderParameters:
         include: Regular expressions; a topic must match one of them (whole name). None: every topic.
         exclude: Regular expressions; a topic must match none of them.
         robots: Namespaces, below the node's own, of robots whose topics are subscribed before they appear.
-        pictures: "compressed" (40 KB each), "raw" (0.9 MB), "both" or "none".
+        pictures: "compressed" (10 KB each), "raw" (0.9 MB), "both" or "none".
+        picture_rate: How many of each topic's pictures go into a second of the recording, by their stamps; 0: all.
         split_size: Size of a file after which the recording goes on in another one [MB]; 0 for one file.
         split_time: Time in a file after which the recording goes on in another one [s]; 0 for one file.
         free_space: Disk space to leave free [MB].
@@ -60,6 +64,7 @@ class RecorderParameters:
     exclude: tuple[str, ...] = ()
     robots: tuple[str, ...] = ("",)
     pictures: str = "compressed"
+    picture_rate: float = PICTURE_RATE
     split_size: float = 0.0
     split_time: float = 0.0
     free_space: float = FREE / 1e6
@@ -83,6 +88,7 @@ class RecorderParameters:
         for note in self.notes:
             if "=" not in note:
                 raise ValueError(f"note {note!r} has no value; expected name=value")
+        PictureRate(self.picture_rate)
         Split(int(self.split_size * 1e6), self.split_time)
 
     def wants(self, name: str) -> bool:
@@ -105,6 +111,7 @@ class _Input:
     quality: Quality
     message_class: type[Any]
     subscription: Any
+    is_picture: bool
     numbers: LostMessages = field(default_factory=LostMessages)
 
     def take(self) -> Iterable[tuple[int, int, _Input, bytes, int]]:
@@ -137,6 +144,7 @@ class RecorderNode(ComponentNode):
         super().__init__("recorder", namespace=namespace)
         self.settings = self.load(settings or RecorderParameters())
         self.bag: Bag | None = None
+        self._rate = PictureRate(self.settings.picture_rate)
         self.inputs: dict[str, _Input] = {}
         self.lost: dict[str, int] = {}
         """Messages that were lost during the recording, by topic."""
@@ -239,6 +247,8 @@ class RecorderNode(ComponentNode):
             return
         try:
             for received, sent, source, data, _ in messages:
+                if source.is_picture and not self._rate.keeps(source.name, serialized_stamp(data)):
+                    continue
                 bag.add_topic(source.name, source.type_name, source.quality)
                 bag.write(source.name, data, received, sent)
         except OSError as error:
@@ -296,7 +306,9 @@ class RecorderNode(ComponentNode):
             subscription = rclpy_implementation.Subscription(
                 self.handle, message_class, name, profile.get_c_qos_profile()
             )
-        self.inputs[name] = _Input(name, type_name, quality, message_class, subscription)
+        self.inputs[name] = _Input(
+            name, type_name, quality, message_class, subscription, PICTURE.fullmatch(name) is not None
+        )
 
     def give_up(self, error: OSError) -> None:
         """End a recording that cannot go on; what reached the disk is kept."""

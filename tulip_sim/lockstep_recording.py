@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rclpy.serialization import serialize_message
 
 from tulip_description.robot import load_robot
@@ -23,6 +25,7 @@ from tulip_ros import topics
 from tulip_ros.bag import Bag
 from tulip_ros.errors import unknown
 from tulip_ros.log_notes import Notebook
+from tulip_ros.picture_rate import PICTURE_RATE, PictureRate
 from tulip_ros.topics import Topic
 from tulip_sim.messages import jpeg_to_message, png_to_message, report_to_message, truth_to_message
 from tulip_strategy.messages import (
@@ -40,8 +43,22 @@ from tulip_worldmodel.messages import (
 )
 
 Messages = Iterable[tuple[Topic, Any]]
-PICTURES = {"jpeg": jpeg_to_message, "png": png_to_message}
+COMPRESS = {"compressed": jpeg_to_message, "png": png_to_message}
+KINDS = (*COMPRESS, "none")
 """How pictures can be recorded: vision on a JPEG finds nearly the same as live, on a PNG exactly the same."""
+
+
+@dataclass(frozen=True)
+class RecordedPictures:
+    """What of the camera's pictures is recorded.
+
+    Attributes:
+        kind: One of `KINDS`.
+        rate: How many in a second, by their stamps; 0 for all.
+    """
+
+    kind: str = "compressed"
+    rate: float = PICTURE_RATE
 
 
 class LockstepRecording:
@@ -50,19 +67,21 @@ class LockstepRecording:
     Pictures go in compressed, as `camera/image_raw/compressed`; times are simulated times.
     """
 
-    def __init__(self, folder: Path, pictures: str = "jpeg") -> None:
+    def __init__(self, folder: Path, pictures: RecordedPictures | None = None) -> None:
         """Begin a recording.
 
         Args:
             folder: New folder for it.
-            pictures: One of `PICTURES`.
+            pictures: Which; None for the usual ones.
 
         Raises:
             BadInputError: if it cannot be written, or there is no such kind of pictures.
         """
-        if pictures not in PICTURES:
-            raise unknown("kind of pictures", pictures, PICTURES)
-        compress = PICTURES[pictures]
+        pictures = pictures or RecordedPictures()
+        if pictures.kind not in KINDS:
+            raise unknown("kind of pictures", pictures.kind, KINDS)
+        self._compress = COMPRESS.get(pictures.kind)
+        self._rate = PictureRate(pictures.rate)
         self._bag = Bag(folder)
         self.path = self._bag.path
         cells = np.array([foot.cells for foot in load_robot().feet])
@@ -70,7 +89,7 @@ class LockstepRecording:
             "sensors": lambda stamp, value: zip(
                 (topics.JOINT_STATES, topics.IMU, topics.FOOT_FORCES), sensors_to_messages(value, cells), strict=True
             ),
-            "camera/image_raw": lambda stamp, value: [(topics.CAMERA_COMPRESSED, compress(value, stamp))],
+            "camera/image_raw": self._picture,
             "legs/joint_command": lambda stamp, value: [(topics.LEG_COMMAND, joint_command_to_message(value))],
             "head/joint_command": lambda stamp, value: [(topics.HEAD_JOINT_COMMAND, joint_command_to_message(value))],
             "features": lambda stamp, value: [(topics.FEATURES, features_to_message(value))],
@@ -113,11 +132,16 @@ class LockstepRecording:
             KeyError: for a topic that has no message.
             OSError: if the file cannot be written.
         """
+        if topic == "camera/image_raw" and not self._rate.keeps(namespace, stamp):
+            return
         for entry, message in self._converters[topic](stamp, value):
             name = f"/{entry.within(namespace).name.lstrip('/')}"
             self._bag.add_topic(name, entry.type_name, entry.quality)
             self._bag.write(name, serialize_message(message), stamp)
         self._bag.flush()
+
+    def _picture(self, stamp: int, value: NDArray[np.uint8]) -> Messages:
+        return [(topics.CAMERA_COMPRESSED, self._compress(value, stamp))] if self._compress else []
 
     def close(self) -> None:
         """End the recording."""

@@ -11,7 +11,7 @@ import numpy as np
 from tulip_description.field import load_field
 from tulip_sim.lockstep import Lockstep, Settings
 from tulip_sim.lockstep_notes import explain_trial
-from tulip_sim.lockstep_recording import LockstepRecording
+from tulip_sim.lockstep_recording import LockstepRecording, RecordedPictures
 from tulip_sim.scenario import make_scenario
 from tulip_sim.trial import NO_CAMERA, TrialObserver, TrialSummary
 from tulip_strategy.interface import UserRequest
@@ -28,6 +28,7 @@ def play_lockstep(
     progress: Progress | None = None,
     eyes_beside: bool = False,
     strategy: str = "dribble_and_kick",
+    recorded: RecordedPictures | None = None,
 ) -> TrialSummary:
     """Play one trial.
 
@@ -39,12 +40,13 @@ def play_lockstep(
         progress: Told once in a simulated second.
         eyes_beside: Let camera and vision work in a process of their own.
         strategy: Name of what the robot plays.
+        recorded: What of the pictures is recorded.
 
     Raises:
         BadInputError: if the recording cannot be written.
     """
     observer = TrialObserver()
-    recording = LockstepRecording(record) if record else None
+    recording = LockstepRecording(record, recorded) if record else None
 
     def listen(topic: str, stamp: int, value: object) -> None:
         if recording is not None:

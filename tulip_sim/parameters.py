@@ -8,17 +8,25 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class SensorParameters:
-    """Errors of the sensors. Standard deviations unless said otherwise; all assumed, from ordinary components."""
+    """Errors of the sensors. Standard deviations unless said otherwise; all assumed, from ordinary components.
+
+    Resolutions are powers of two, as a counter in a register has them.
+    """
 
     period: int = 4  # [ms] one reading of the whole body per control tick
-    encoder_step: float = 1e-4  # [rad] resolution of a 16-bit encoder at the joint
+    encoder_step: float = 2.0**-13  # [rad] 1.2e-4: resolution of a 16-bit encoder at the joint
     encoder_noise: float = 1e-4  # [rad]
     velocity_noise: float = 0.02  # [rad/s] of the motor-side encoder, differentiated over 1 ms
+    velocity_step: float = 2.0**-8  # [rad/s] 0.004
+    effort_step: float = 2.0**-6  # [N m] 0.016: a 14-bit current sensor
     gyro_noise: float = 0.005  # [rad/s] per reading
+    gyro_step: float = 2.0**-11  # [rad/s] 0.0005: 16 bits for +-16
     gyro_bias: float = 0.002  # [rad/s] constant in a run
     accelerometer_noise: float = 0.05  # [m/s^2]
     accelerometer_bias: float = 0.02  # [m/s^2] constant in a run
+    accelerometer_step: float = 2.0**-9  # [m/s^2] 0.002: 16 bits for +-64
     attitude_noise: float = 0.001  # [rad] of the IMU's own orientation estimate, white
+    attitude_step: float = 2.0**-16  # of the quaternion's parts: 3e-5 rad
     attitude_bias: float = 0.003  # [rad] roll and pitch, constant in a run: mounting
     yaw_drift: float = 0.0003  # [rad/s] constant in a run: about 1 degree per minute without a magnetometer
     cell_noise: float = 1.0  # [N]
@@ -125,11 +133,16 @@ class WorldParameters:
             encoder_step=0.0,
             encoder_noise=0.0,
             velocity_noise=0.0,
+            velocity_step=0.0,
+            effort_step=0.0,
             gyro_noise=0.0,
+            gyro_step=0.0,
             gyro_bias=0.0,
             accelerometer_noise=0.0,
             accelerometer_bias=0.0,
+            accelerometer_step=0.0,
             attitude_noise=0.0,
+            attitude_step=0.0,
             attitude_bias=0.0,
             yaw_drift=0.0,
             cell_noise=0.0,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tulip_sim.lockstep_match import LockstepMatch
 from tulip_sim.lockstep_notes import explain_match
-from tulip_sim.lockstep_recording import LockstepRecording
+from tulip_sim.lockstep_recording import LockstepRecording, RecordedPictures
 from tulip_sim.match_places import team_truth
 from tulip_sim.match_rules import NAMESPACES, TEAMS
 from tulip_sim.match_settings import MatchSettings
@@ -27,6 +27,7 @@ def play_lockstep_match(
     progress: Progress | None = None,
     say: Callable[[str], None] | None = None,
     eyes_beside: bool = False,
+    recorded: RecordedPictures | None = None,
 ) -> MatchSummary:
     """Play one match.
 
@@ -37,13 +38,14 @@ def play_lockstep_match(
         progress: Told once in a simulated second.
         say: Told each line of the referee's log as it comes.
         eyes_beside: Let cameras and vision work in processes of their own.
+        recorded: What of the pictures is recorded.
 
     Raises:
         BadInputError: if the recording cannot be written.
     """
     settings = settings or MatchSettings()
     observers = [TrialObserver() for _ in TEAMS]
-    recording = LockstepRecording(record) if record else None
+    recording = LockstepRecording(record, recorded) if record else None
     match: LockstepMatch | None = None
     said = 0
 

@@ -113,19 +113,19 @@ class SensorModel:
         orientation = np.array(
             quaternion_product(quaternion_product(level, state.base_orientation.tolist()), (*tilt.tolist(), 1.0))
         )
+        turning = rotation_t @ state.base_angular_velocity + self._gyro_bias
+        turning += p.gyro_noise * noise[2 * n + 3 : 2 * n + 6]
+        pushed = rotation_t @ acceleration + self._accelerometer_bias
+        pushed += p.accelerometer_noise * noise[2 * n + 6 : 2 * n + 9]
         noisy_cells = state.foot_cells.ravel() + p.cell_noise * noise[2 * n + 9 :]
         return Sensors(
             stamp=state.stamp,
             joint_positions=_rounded(state.joint_positions + p.encoder_noise * noise[:n], p.encoder_step),
-            joint_velocities=state.joint_velocities + p.velocity_noise * noise[n : 2 * n],
-            joint_efforts=state.joint_efforts,
-            imu_orientation=orientation / math.sqrt(float(orientation @ orientation)),
-            imu_angular_velocity=rotation_t @ state.base_angular_velocity
-            + self._gyro_bias
-            + p.gyro_noise * noise[2 * n + 3 : 2 * n + 6],
-            imu_linear_acceleration=rotation_t @ acceleration
-            + self._accelerometer_bias
-            + p.accelerometer_noise * noise[2 * n + 6 : 2 * n + 9],
+            joint_velocities=_rounded(state.joint_velocities + p.velocity_noise * noise[n : 2 * n], p.velocity_step),
+            joint_efforts=_rounded(state.joint_efforts, p.effort_step),
+            imu_orientation=_rounded(orientation / math.sqrt(float(orientation @ orientation)), p.attitude_step),
+            imu_angular_velocity=_rounded(turning, p.gyro_step),
+            imu_linear_acceleration=_rounded(pushed, p.accelerometer_step),
             foot_cells=np.maximum(_rounded(noisy_cells, p.cell_step), 0.0).reshape(2, 4),
         )
 

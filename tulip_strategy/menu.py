@@ -27,6 +27,8 @@ class Wish:
 
 Send = Callable[[Wish], tuple[bool, str]]
 """Passes a wish to the robot; returns whether it was taken, and a message."""
+Record = Callable[[bool], tuple[bool, str]]
+"""Begins (True) or ends a recording; returns whether that was done, and where it is or why not."""
 
 ENTRIES: tuple[tuple[str, str, UserRequest], ...] = (
     ("s", "start: obey the referee and play", UserRequest.PLAY),
@@ -36,39 +38,45 @@ ENTRIES: tuple[tuple[str, str, UserRequest], ...] = (
     ("k", "kick test", UserRequest.KICK_TEST),
     ("l", "limp: legs without stiffness", UserRequest.LIMP),
 )
+RECORDING: tuple[tuple[str, str, bool], ...] = (
+    ("r", "begin a recording", True),
+    ("e", "end the recording", False),
+)
 CHOOSE, QUIT = "c", "q"
 
 
 class Menu:
     """Shows the choices and sends what the user picks, until the user quits or the input ends."""
 
-    def __init__(self, console: Console, send: Send, strategies: tuple[str, ...]) -> None:
+    def __init__(self, console: Console, send: Send, record: Record, strategies: tuple[str, ...]) -> None:
         self._console = console
         self._send = send
+        self._record = record
         self._strategies = strategies
 
     def run(self) -> None:
         """Ask until the user quits; the robot keeps its last command then."""
         self._show()
-        keys = [key for key, _, _ in ENTRIES] + [CHOOSE, QUIT]
+        keys = [key for key, *_ in (*ENTRIES, *RECORDING)] + [CHOOSE, QUIT]
+        recording = {key: begin for key, _, begin in RECORDING}
         while True:
             try:
                 key = Prompt.ask("Wish", console=self._console, choices=keys, show_choices=True)
                 if key == QUIT:
                     return
-                accepted, message = self._send(self._wish(key))
+                if key in recording:
+                    accepted, message = self._record(recording[key])
+                else:
+                    accepted, message = self._send(self._wish(key))
             except (EOFError, KeyboardInterrupt):
                 self._console.print()
                 return
-            if accepted:
-                self._console.print("[green]taken[/green]")
-            else:
-                self._console.print("[red]refused[/red]: ", end="")
-                self._console.print(message, markup=False)
+            self._console.print("[green]taken[/green]" if accepted else "[red]refused[/red]", end="")
+            self._console.print(f": {message}" if message else "", markup=False, highlight=False, soft_wrap=True)
 
     def _show(self) -> None:
         table = Table(show_header=False, box=None)
-        for key, words, _ in ENTRIES:
+        for key, words, _ in (*ENTRIES, *RECORDING):
             table.add_row(key, words)
         table.add_row(CHOOSE, "choose a strategy and start")
         table.add_row(QUIT, "quit the menu; the last wish holds")

@@ -1,10 +1,12 @@
-"""The text menu's connection to the robot: calls the service of user input."""
+"""The text menu's connection to the robot: calls the services of user input and of the recorder."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from time import monotonic
+from typing import Any
 
+from rclpy.client import Client
 from rclpy.node import Node
 from rich.console import Console
 
@@ -20,12 +22,17 @@ LOOK = 0.1  # [s] between two looks
 
 
 class MenuNode(Node):  # type: ignore[misc]  # rclpy comes without types
-    """A client of user input."""
+    """A client of user input and of the recorder."""
 
     def __init__(self) -> None:
         """Make the client; nothing waits yet."""
         super().__init__("menu")
         self._wishes = self.create_client(topics.SET_USER_COMMAND.type, topics.SET_USER_COMMAND.name)
+        # Robots have namespaces; a recorder of their own, or one outside that records them all.
+        self._recorders = {
+            service.name: [self.create_client(service.type, name) for name in (service.name, f"/{service.name}")]
+            for service in (topics.START_RECORDING, topics.STOP_RECORDING)
+        }
 
     def connect(self, spin: Callable[[float], None]) -> None:
         """Wait for user input.
@@ -47,15 +54,28 @@ class MenuNode(Node):  # type: ignore[misc]  # rclpy comes without types
         request = topics.SET_USER_COMMAND.type.Request(
             request=wish.request.value, strategy=wish.strategy, velocity=list(wish.velocity), argument=wish.argument
         )
-        future = self._wishes.call_async(request)
-        end = monotonic() + ANSWER
-        while not future.done():
-            if monotonic() > end:
-                self._wishes.remove_pending_request(future)
-                return False, f"user_input does not answer within {ANSWER:.0f} s; is it still running?"
-            spin(LOOK)
-        answer = future.result()
-        return bool(answer.success), str(answer.message)
+        return _ask(self._wishes, request, "user_input", spin)
+
+    def record(self, begin: bool, spin: Callable[[float], None]) -> tuple[bool, str]:
+        """Begin or end a recording; return whether that was done, and where it is or why not."""
+        service = topics.START_RECORDING if begin else topics.STOP_RECORDING
+        for client in self._recorders[service.name]:
+            if client.service_is_ready():
+                return _ask(client, service.type.Request(), "recorder", spin)
+        return False, "no recorder runs here; start one in another terminal: python3 scripts/record.py --wait"
+
+
+def _ask(client: Client, request: Any, server: str, spin: Callable[[float], None]) -> tuple[bool, str]:
+    """Return whether a service did what it was asked for, and its message."""
+    future = client.call_async(request)
+    end = monotonic() + ANSWER
+    while not future.done():
+        if monotonic() > end:
+            client.remove_pending_request(future)
+            return False, f"{server} does not answer within {ANSWER:.0f} s; is it still running?"
+        spin(LOOK)
+    answer = future.result()
+    return bool(answer.success), str(answer.message)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -69,4 +89,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     with session(MenuNode, arguments) as (node, spin):
         node.connect(spin)
-        Menu(Console(), lambda wish: node.send(wish, spin), tuple(STRATEGIES)).run()
+        Menu(
+            Console(),
+            lambda wish: node.send(wish, spin),
+            lambda begin: node.record(begin, spin),
+            tuple(STRATEGIES),
+        ).run()

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tulip_description.field import Field
 from tulip_description.planar import Pose2D
+from tulip_description.short_numbers import fixed_point, significant
 from tulip_motion.interface import Odometry
 from tulip_vision.features import Features
 from tulip_worldmodel.ball_filter import BallFilter, BallParameters
@@ -126,7 +127,8 @@ class WorldModel:
         if then.stamp < self._now.stamp:
             then = self._now
         moved = increment(self._now, then)
-        robot = RobotEstimate(*self._localization.predicted(moved), then.pose)
+        pose, covariance = self._localization.predicted(moved)
+        robot = RobotEstimate(_short(pose), significant(covariance), _short(then.pose))
         here = np.array([self._now.pose.x, self._now.pose.y])
         ball = None
         if self._ball.known:
@@ -170,11 +172,16 @@ def _estimate(
     relative = np.array(robot.pose_in_odom.inverse().transform(state[:2]))
     velocity = to_footprint @ state[2:]
     return ObjectEstimate(
-        position=relative,
-        velocity=velocity,
-        covariance=both @ point.covariance @ both.T,
-        position_in_map=np.array(robot.pose.transform(relative)),
-        velocity_in_map=robot.pose.rotation() @ velocity,
+        position=fixed_point(relative),
+        velocity=fixed_point(velocity),
+        covariance=significant(both @ point.covariance @ both.T),
+        position_in_map=fixed_point(np.array(robot.pose.transform(relative))),
+        velocity_in_map=fixed_point(robot.pose.rotation() @ velocity),
         age=max(0.0, (stamp - last_seen) * 1e-9),
         confidence=confidence,
     )
+
+
+def _short(pose: Pose2D) -> Pose2D:
+    """Return a pose as it is told: digits that mean nothing would take most of a recording's space."""
+    return Pose2D(*fixed_point(pose.as_array()).tolist())

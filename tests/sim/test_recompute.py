@@ -22,7 +22,7 @@ from tulip_ros.log_edit import writing
 from tulip_ros.log_file import Log
 from tulip_sim.lockstep import Lockstep, Settings
 from tulip_sim.lockstep_notes import explain_trial
-from tulip_sim.lockstep_recording import LockstepRecording
+from tulip_sim.lockstep_recording import LockstepRecording, RecordedPictures
 from tulip_sim.messages import jpeg_to_message, png_to_message
 from tulip_sim.perception import PerceptionParameters
 from tulip_sim.recompute.differences import Comparison
@@ -40,7 +40,7 @@ EXACT = 1e-9  # [m], [rad] another machine's rounding, carried through some hund
 
 
 def record(folder: Path, seconds: float, perception: PerceptionParameters | None) -> Path:
-    recording = LockstepRecording(folder, "png")
+    recording = LockstepRecording(folder, RecordedPictures("png", 0.0))
     settings = Settings(perception=perception)
     scenario = make_scenario("trial", np.random.default_rng(SEED), load_field())
     trial = Lockstep(scenario, SEED, settings, recording.write)

@@ -87,7 +87,8 @@ def use_menu(monkeypatch: pytest.MonkeyPatch, *answers: str) -> tuple[list[Wish]
         return not refusal, refusal
 
     screen = io.StringIO()
-    Menu(Console(file=screen, width=100), send, STRATEGIES).run()
+    recorder = iter([(True, "recordings/now/now.mcap"), (False, "nothing was being recorded")])
+    Menu(Console(file=screen, width=100), send, lambda begin: next(recorder), STRATEGIES).run()
     return sent, screen.getvalue()
 
 
@@ -111,3 +112,9 @@ def test_the_menu_asks_again_after_a_wrong_key_and_shows_a_refusal(monkeypatch: 
     sent, shown = use_menu(monkeypatch, "z", "w", "5", "0", "0")
     assert [wish.request for wish in sent] == [UserRequest.WALK_TEST]
     assert "refused: forward velocity is 5.0 m/s" in shown
+
+
+def test_the_menu_begins_and_ends_a_recording_and_shows_where_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    sent, shown = use_menu(monkeypatch, "r", "e")
+    assert not sent
+    assert "taken: recordings/now/now.mcap" in shown and "refused: nothing was being recorded" in shown

@@ -14,7 +14,7 @@ from tulip_ros.log_file import Log
 from tulip_sim.bench.runner import Row
 from tulip_sim.lockstep import Lockstep, Settings
 from tulip_sim.lockstep_notes import explain_trial
-from tulip_sim.lockstep_recording import LockstepRecording
+from tulip_sim.lockstep_recording import LockstepRecording, RecordedPictures
 from tulip_sim.perception import PerceptionParameters
 from tulip_sim.recompute.run import recompute
 from tulip_sim.scenario import make_scenario
@@ -84,7 +84,7 @@ def lines(rows: Sequence[Row]) -> list[str]:
 
 
 def _record(folder: Path, pictures: str, seed: int, seconds: float) -> None:
-    recording = LockstepRecording(folder, "jpeg" if pictures == "none" else pictures)
+    recording = LockstepRecording(folder, RecordedPictures({"jpeg": "compressed"}.get(pictures, pictures), 0.0))
     settings = Settings(perception=PerceptionParameters() if pictures == "none" else None)
     scenario = make_scenario("trial", np.random.default_rng(seed), load_field())
     trial = Lockstep(scenario, seed, settings, recording.write)
