@@ -48,7 +48,8 @@ def main(
     try:
         namespace = check_namespace(namespace)
         settings = RecorderParameters(
-            **({"folder" if wait else "path": str(path)} if path else {}),
+            folder=str(path) if path and wait else RecorderParameters.folder,
+            path=str(path) if path and not wait else "",
             start=not wait,
             include=tuple(include or ()),
             exclude=tuple(exclude or ()),
