@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
+from tulip_ros.mcap_file import COMPRESSIONS
 from tulip_ros.picture_rate import PICTURE_RATE
 from tulip_ros.plan import check_namespace
 from tulip_ros.recorder_node import PICTURES, RecorderNode, RecorderParameters
@@ -37,6 +38,9 @@ def main(
     picture_rate: Annotated[
         float, typer.Option(help="Pictures of each camera in a second of the recording; 0 for all.")
     ] = PICTURE_RATE,
+    compression: Annotated[
+        str, typer.Option(help=f"{' or '.join(COMPRESSIONS)}; none is faster, for raw pictures of many cameras.")
+    ] = "zstd",
     split_size: Annotated[float, typer.Option(help="MB after which the next file is begun; 0 for one file.")] = 0.0,
     split_time: Annotated[float, typer.Option(help="Seconds after which the next file is begun; 0: never.")] = 0.0,
     wait: Annotated[
@@ -55,6 +59,7 @@ def main(
             exclude=tuple(exclude or ()),
             pictures=pictures,
             picture_rate=picture_rate,
+            compression=compression,
             split_size=split_size,
             split_time=split_time,
         )

@@ -35,8 +35,8 @@ from tulip_ros.time import header, stamp_of
 
 Array = NDArray[np.float64]
 JOINT_NAMES = list(JOINTS)
-FINE, COARSE = 16, 12
-"""Binary digits after the point: of lengths and angles (0.015 mm), of speeds and torques (0.0002 rad/s, N m)."""
+FINE, COARSE = 16, 10
+"""Binary digits after the point: of lengths and angles (0.015 mm), of speeds and torques (0.001 rad/s, N m)."""
 
 
 def sensors_to_messages(sensors: Sensors, cell_positions: Array) -> tuple[JointState, Imu, FootForces]:

@@ -13,6 +13,7 @@ from tulip_description.model import floating_model
 from tulip_description.planar import Pose2D
 from tulip_description.robot import HEAD_JOINTS, LEG_JOINTS, Robot
 from tulip_description.robot_io import JointCommand, Sensors
+from tulip_description.short_numbers import significant
 from tulip_motion.course import Wish, is_at, middle
 from tulip_motion.fall_detection import FallDetector
 from tulip_motion.footsteps import Footstep
@@ -201,10 +202,12 @@ class Motion:
             rotation_z(-yaw) @ estimate.base_velocity,
             estimate.base_rotation.T @ estimate.angular_velocity,
             self._dead_reckoning.distance,
-            self._dead_reckoning.pose_covariance(
-                self._stamp, position, yaw, self._ground.signs, self._mode is MotionMode.FALLEN
+            significant(
+                self._dead_reckoning.pose_covariance(
+                    self._stamp, position, yaw, self._ground.signs, self._mode is MotionMode.FALLEN
+                )
             ),
-            self._dead_reckoning.twist_covariance(),
+            significant(self._dead_reckoning.twist_covariance()),
         )
 
     def state(self) -> MotionState:

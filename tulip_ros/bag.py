@@ -81,13 +81,14 @@ class Bag:
     latched topics, which are marked so that `Log` reads them once.
     """
 
-    def __init__(self, folder: Path, split: Split | None = None, free: int = FREE) -> None:
+    def __init__(self, folder: Path, split: Split | None = None, free: int = FREE, compression: str = "zstd") -> None:
         """Begin a recording.
 
         Args:
             folder: Is made; it must not exist yet, or be empty. The files in it are named after it.
             split: When to go on in a new file; None for never.
             free: Disk space to leave free [B].
+            compression: "zstd", or "none": three times as fast for raw pictures, and twice as large.
 
         Raises:
             BadInputError: if the folder holds something, cannot be written, or too little disk space is free.
@@ -95,6 +96,7 @@ class Bag:
         self.folder = folder
         self._split = split or Split()
         self._free = free
+        self._compression = compression
         self._parts: list[_Part] = []
         self._topics: dict[str, _Topic] = {}
         self._schemas: dict[tuple[str, str], Schema] = {}
@@ -329,7 +331,7 @@ class Bag:
 
     def _begin(self) -> _Part:
         number = f"_{len(self._parts)}" if self._split else ""
-        part = _Part(McapFile(self.folder / f"{self.folder.name}{number}.mcap"))
+        part = _Part(McapFile(self.folder / f"{self.folder.name}{number}.mcap", compression=self._compression))
         self._parts.append(part)
         return part
 

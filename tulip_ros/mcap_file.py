@@ -31,6 +31,7 @@ from mcap.well_known import Profile
 MAGIC = b"\x89MCAP0\r\n"
 LIBRARY = "tulip_ros"
 """Names the program in files that it writes, whose messages are numbered from 0 on."""
+COMPRESSIONS = ("zstd", "none")
 LEVEL = 1  # of zstd: on a match two thirds of level 3's time, for 1 % more bytes
 MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 MESSAGE_FIXED = MESSAGE.size - 9  # [B] of a message beside its data
@@ -86,8 +87,13 @@ class McapFile:
     A record that does not fit on the disk any more is taken back, so the file ends with a whole record at any time.
     """
 
-    def __init__(self, path: Path, library: str = LIBRARY) -> None:
+    def __init__(self, path: Path, library: str = LIBRARY, compression: str = "zstd") -> None:
         """Begin the file.
+
+        Args:
+            path: Of the new file.
+            library: Name of the program that writes it.
+            compression: Of chunks: one of `COMPRESSIONS`.
 
         Raises:
             OSError: if it exists, or cannot be written.
@@ -103,7 +109,7 @@ class McapFile:
         self._chunk_indices: list[bytes] = []
         self._metadata: list[MetadataIndex] = []
         self._attachments: list[AttachmentIndex] = []
-        self._compressor = zstandard.ZstdCompressor(level=LEVEL)
+        self._compressor = zstandard.ZstdCompressor(level=LEVEL) if compression == "zstd" else None
         self._stream = open(path, "xb", buffering=0)
         self._append(MAGIC, encode(Header(Profile.ROS2, library)))
 
@@ -165,8 +171,8 @@ class McapFile:
         """
         content = chunk.content()
         self.add_compressed(
-            self._compressor.compress(content),
-            "zstd",
+            self._compressor.compress(content) if self._compressor else content,
+            "zstd" if self._compressor else "",
             (chunk.first, chunk.last),
             len(content),
             zlib.crc32(content),

@@ -18,6 +18,7 @@ from tulip_ros import log_notes, parameters, schemas, topics
 from tulip_ros.bag import FREE, Bag, Split
 from tulip_ros.errors import BadInputError
 from tulip_ros.lost_messages import LostMessages
+from tulip_ros.mcap_file import COMPRESSIONS
 from tulip_ros.node_parameters import ParameterAsker
 from tulip_ros.picture_rate import PICTURE_RATE, PictureRate
 from tulip_ros.run import ComponentNode, run
@@ -51,6 +52,7 @@ class RecorderParameters:
         robots: Namespaces, below the node's own, of robots whose topics are subscribed before they appear.
         pictures: "compressed" (10 KB each), "raw" (0.9 MB), "both" or "none".
         picture_rate: How many of each topic's pictures go into a second of the recording, by their stamps; 0: all.
+        compression: Of the files: "zstd", or "none" for raw pictures of many cameras.
         split_size: Size of a file after which the recording goes on in another one [MB]; 0 for one file.
         split_time: Time in a file after which the recording goes on in another one [s]; 0 for one file.
         free_space: Disk space to leave free [MB].
@@ -65,6 +67,7 @@ class RecorderParameters:
     robots: tuple[str, ...] = ("",)
     pictures: str = "compressed"
     picture_rate: float = PICTURE_RATE
+    compression: str = "zstd"
     split_size: float = 0.0
     split_time: float = 0.0
     free_space: float = FREE / 1e6
@@ -83,6 +86,8 @@ class RecorderParameters:
                 raise ValueError(f"{expression!r} is no regular expression: {error}") from error
         if self.pictures not in PICTURES:
             raise ValueError(f"pictures is {self.pictures!r}; expected one of {', '.join(PICTURES)}")
+        if self.compression not in COMPRESSIONS:
+            raise ValueError(f"compression is {self.compression!r}; expected one of {', '.join(COMPRESSIONS)}")
         if not self.free_space >= 0.0:
             raise ValueError(f"free_space is {self.free_space} MB; expected >= 0")
         for note in self.notes:
@@ -181,7 +186,7 @@ class RecorderNode(ComponentNode):
         folder = Path(path) if path else Path(settings.folder) / datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
         self.take()  # what came before does not belong to it
         split = Split(int(settings.split_size * 1e6), settings.split_time)
-        bag = Bag(folder.absolute(), split, int(settings.free_space * 1e6))
+        bag = Bag(folder.absolute(), split, int(settings.free_space * 1e6), settings.compression)
         try:
             own = dict(note.split("=", 1) for note in settings.notes)
             log_notes.explain(bag, {**own, "time": "of reception, in ns since 1970"})

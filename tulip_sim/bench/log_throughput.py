@@ -6,18 +6,22 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from rclpy.serialization import serialize_message
-from sensor_msgs.msg import Image, JointState
+from sensor_msgs.msg import JointState
 
 from tulip_ros import schemas, topics
 from tulip_ros.bag import Bag
 from tulip_sim.bench.runner import Row
+from tulip_sim.messages import jpeg_to_message
+from tulip_vision.messages import picture_to_message
 
 ROUNDS = 5
-SMALL, PICTURES = 100_000, 150
+SMALL, PICTURES, RAW_PICTURES = 100_000, 5_000, 150
 UNIQUE = 20_000  # small messages: 14 MB, so that none comes twice in one chunk
 COLLECTED = 30  # messages that the recorder takes at one time during a match
 
@@ -26,13 +30,15 @@ def measure(kind: str) -> Row:
     """Write the same messages with each writer in turn.
 
     Args:
-        kind: "small messages" (joint states of the 14 joints, with noise) or "pictures" (640x480, raw, with noise).
+        kind: "small messages" (joint states of the 14 joints, with noise), "pictures" (640x480 with noise, as JPEG) or
+            "raw pictures" (the same as they are).
     """
-    messages, topic = _joint_states() if kind == "small messages" else _pictures()
+    messages, topic = MAKERS[kind]()
     writers: dict[str, Callable[[Path, list[bytes], topics.Topic], None]] = {
-        "ours": _ours,
-        "rosbags zstd": lambda folder, data, topic: _rosbags(folder, data, topic, True),
-        "rosbags": lambda folder, data, topic: _rosbags(folder, data, topic, False),
+        "ours zstd": partial(_ours, compressed=True),
+        "rosbags zstd": partial(_rosbags, compressed=True),
+        "ours": partial(_ours, compressed=False),
+        "rosbags": partial(_rosbags, compressed=False),
     }
     times: dict[str, list[float]] = {name: [] for name in writers}
     sizes: dict[str, int] = {}
@@ -62,21 +68,29 @@ def _joint_states() -> tuple[list[bytes], topics.Topic]:
     return [data[number % len(data)] for number in range(SMALL)], topics.JOINT_STATES
 
 
-def _pictures() -> tuple[list[bytes], topics.Topic]:
+def _noisy() -> list[NDArray[np.uint8]]:
+    """Return ten (480, 640, 3) pictures."""
     rng = np.random.default_rng(1)
     rows, columns = np.mgrid[:480, :640]
     scene = np.stack([rows / 3.0, 90.0 + columns / 10.0, 40.0 + (columns // 80 % 2) * 60.0], axis=-1)
-    data = []
-    for _ in range(10):
-        image = Image(height=480, width=640, encoding="bgr8", step=1920)
-        noisy = np.clip(scene + rng.normal(scale=4.0, size=scene.shape), 0.0, 255.0).astype(np.uint8)
-        image.data.frombytes(noisy.tobytes())
-        data.append(serialize_message(image))
-    return [data[number % len(data)] for number in range(PICTURES)], topics.CAMERA_IMAGE
+    return [np.clip(scene + rng.normal(scale=4.0, size=scene.shape), 0.0, 255.0).astype(np.uint8) for _ in range(10)]
 
 
-def _ours(folder: Path, messages: list[bytes], topic: topics.Topic) -> None:
-    bag = Bag(folder, free=0)
+def _pictures() -> tuple[list[bytes], topics.Topic]:
+    data = [serialize_message(jpeg_to_message(picture, 0)) for picture in _noisy()]
+    return [data[number % len(data)] for number in range(PICTURES)], topics.CAMERA_COMPRESSED
+
+
+def _raw_pictures() -> tuple[list[bytes], topics.Topic]:
+    data = [serialize_message(picture_to_message(picture, 0)) for picture in _noisy()]
+    return [data[number % len(data)] for number in range(RAW_PICTURES)], topics.CAMERA_IMAGE
+
+
+MAKERS = {"small messages": _joint_states, "pictures": _pictures, "raw pictures": _raw_pictures}
+
+
+def _ours(folder: Path, messages: list[bytes], topic: topics.Topic, compressed: bool) -> None:
+    bag = Bag(folder, free=0, compression="zstd" if compressed else "none")
     bag.add_topic(f"/{topic.name}", topic.type_name, topic.quality)
     for number, data in enumerate(messages):
         bag.write(f"/{topic.name}", data, number * 1_000_000)
