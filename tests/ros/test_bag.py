@@ -54,7 +54,7 @@ with session(lambda: ComponentNode("motion", namespace="striker"), ["test"]) as 
 
 @pytest.mark.ros
 def test_everything_published_is_read_back_by_another_reader(ros_domain: int, tmp_path: Path):
-    settings = RecorderParameters(path=str(tmp_path / "trial"), exclude=("/rosout",), pictures="raw")
+    settings = RecorderParameters(path=str(tmp_path / "trial"), exclude=("/rosout",), pictures="raw", picture_rate=0.0)
     with session(lambda: RecorderNode(settings, "striker"), ["test"]) as (node, spin):
         assert node.bag is not None
         publisher = subprocess.Popen([sys.executable, "-c", PUBLISHER])

@@ -111,6 +111,20 @@ def test_publish_times_are_kept(tmp_path: Path):
     assert (message.log_time, message.publish_time) == (2000, 1500)
 
 
+def test_recording_without_compression_is_read_by_other_readers(tmp_path: Path):
+    bag = Bag(tmp_path / "plain", free=0, compression="none")
+    bag.add_topic("/words", "std_msgs/msg/String", topics.STATE)
+    for number in range(3):
+        bag.write("/words", serialize_message(String(data="sand" * 1000)), number)
+    bag.close()
+    assert bag.path.stat().st_size > 12000
+    with AnyReader([bag.folder]) as reader:
+        [connection] = reader.connections
+        assert [reader.deserialize(raw, connection.msgtype).data for _, _, raw in reader.messages()] == [
+            "sand" * 1000
+        ] * 3
+
+
 @pytest.mark.parametrize("robots", [1, 2])
 def test_lockstep_notes_are_parameter_files_that_the_programs_read(tmp_path: Path, robots: int):
     bag = Bag(tmp_path / "bag", free=0)
@@ -326,6 +340,10 @@ def test_topics_that_are_missing_or_of_unknown_types_do_no_harm(tmp_path: Path):
 def test_recorder_refuses_wrong_settings_in_words():
     with pytest.raises(ValueError, match="expected one of compressed, raw, both, none"):
         RecorderParameters(pictures="jpg")
+    with pytest.raises(ValueError, match="picture_rate is -1.0; expected a finite number >= 0, and 0 for all"):
+        RecorderParameters(picture_rate=-1.0)
+    with pytest.raises(ValueError, match="compression is 'lz4'; expected one of zstd, none"):
+        RecorderParameters(compression="lz4")
     with pytest.raises(ValueError, match="expected name=value"):
         RecorderParameters(notes=("seed",))
     assert not RecorderParameters().wants("/striker/camera/image_raw")

@@ -157,7 +157,7 @@ def test_a_recording_holds_the_topics_and_types_of_the_graph(recording: Path) ->
         (topics.ODOMETRY, 50.0),
         (topics.WORLD_STATE, 50.0),
         (topics.GROUND_TRUTH, 50.0),
-        (topics.CAMERA_COMPRESSED, 15.625),
+        (topics.CAMERA_COMPRESSED, 15.625 / 2),
         (topics.FEATURES, 15.625),
     ],
     ids=lambda value: value.name if isinstance(value, topics.Topic) else "",
