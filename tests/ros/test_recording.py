@@ -340,7 +340,7 @@ def test_topics_that_are_missing_or_of_unknown_types_do_no_harm(tmp_path: Path):
 def test_recorder_refuses_wrong_settings_in_words():
     with pytest.raises(ValueError, match="expected one of compressed, raw, both, none"):
         RecorderParameters(pictures="jpg")
-    with pytest.raises(ValueError, match="picture_rate is -1.0; expected a finite number >= 0, and 0 for all"):
+    with pytest.raises(ValueError, match=r"picture_rate is -1\.0; expected a finite number >= 0, and 0 for all"):
         RecorderParameters(picture_rate=-1.0)
     with pytest.raises(ValueError, match="compression is 'lz4'; expected one of zstd, none"):
         RecorderParameters(compression="lz4")

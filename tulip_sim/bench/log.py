@@ -7,15 +7,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tulip_sim.bench import log_kill, log_match, log_throughput
+from tulip_sim.bench import log_kill, log_match, log_replay, log_throughput
 from tulip_sim.bench.runner import Bench, Row
 
 SHARE, SIZE, LOSS = 0.10, 150.0, 1.0  # asked for: of a core; [MB] of 10 minutes; [s] lost at most
+LATE = 2.0  # [ms] asked for
 KILLS = 20
 WRITERS = ("ours zstd", "rosbags zstd", "ours", "rosbags")
 PARTS: dict[str, Callable[..., Row]] = {
     "match": log_match.measure,
     "throughput": log_throughput.measure,
+    "replay": log_replay.measure,
     "kill": log_kill.measure,
 }
 TRIALS = [
@@ -24,11 +26,13 @@ TRIALS = [
     ("throughput", "small messages"),
     ("throughput", "pictures"),
     ("throughput", "raw pictures"),
+    ("replay", 1.0),
+    ("replay", 2.0),
     *(("kill", number) for number in range(1, KILLS + 1)),
 ]
 
 
-def measure(part: str, *arguments: int | str) -> Row:
+def measure(part: str, *arguments: float | str) -> Row:
     """Run one trial of a part."""
     os.environ.setdefault("ROS_DOMAIN_ID", str(60 + os.getpid() % 40))  # no other graph on this machine is recorded
     return PARTS[part](*arguments)
@@ -37,7 +41,12 @@ def measure(part: str, *arguments: int | str) -> Row:
 def summarize(rows: list[Row]) -> list[str]:
     """Return a table for each part."""
     lines: list[str] = []
-    for part, tell in (("match", _matches), ("throughput", _throughput), ("kill", _kills)):
+    for part, tell in (
+        ("match", _matches),
+        ("throughput", _throughput),
+        ("replay", _replays),
+        ("kill", _kills),
+    ):
         of_part = [row for row in rows if row["part"] == part]
         if of_part:
             lines += ["", *tell(of_part)] if lines else tell(of_part)
@@ -80,6 +89,21 @@ def _throughput(rows: list[Row]) -> list[str]:
             for name in WRITERS
         ]
         lines.append(f"| {row['messages']} {row['kind']} of {row['bytes each']} B | {' | '.join(cells)} |")
+    return lines
+
+
+def _replays(rows: list[Row]) -> list[str]:
+    lines = [
+        f"A trial of lockstep is replayed for {log_replay.PLAYED:.0f} s and recorded again: by how much the time when a"
+        " message arrived, as the middleware notes it, differs from the recorded one. Asked for:"
+        f" {LATE:.0f} ms in the median.",
+        "",
+        "| rate | messages | arrived | median | 99 % below | greatest |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in rows:
+        late = " | ".join(f"{row[name]} ms" for name in ("median [ms]", "99 % [ms]", "greatest [ms]"))
+        lines.append(f"| {row['rate']:g} | {row['messages']} | {row['arrived']} | {late} |")
     return lines
 
 

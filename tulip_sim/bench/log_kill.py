@@ -87,6 +87,7 @@ def measure(number: int) -> Row:
     with tempfile.TemporaryDirectory(prefix="tulip_log_") as scratch:
         folder = Path(scratch) / "killed"
         arguments = ["--ros-args", "-p", f"path:={folder}", "-p", "exclude:=['.*rosout', '.*diagnostics']"]
+        arguments += ["-p", "picture_rate:=0.0"]
         recorder = subprocess.Popen([sys.executable, "-m", "tulip_ros.recorder_node", *arguments])
         sender = subprocess.Popen([sys.executable, "-c", PUBLISHER])
         try:
