@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from tulip_description import frames
 from tulip_description.robot import JOINTS, LEG_JOINTS, load_robot
 from tulip_description.robot_io import JointCommand, Sensors
+from tulip_description.short_numbers import fixed_point
 from tulip_motion.interface import (
     HeadCommand,
     HeadMode,
@@ -24,6 +25,7 @@ from tulip_motion.interface import (
     WalkMode,
 )
 from tulip_motion.messages import (
+    COARSE,
     body_transforms,
     head_command_from_message,
     head_command_to_message,
@@ -58,6 +60,11 @@ def _assert_equal(value: Any, expected: Any) -> None:
     assert type(value) is type(expected)
     for field in dataclasses.fields(expected):
         np.testing.assert_array_equal(getattr(value, field.name), getattr(expected, field.name), err_msg=field.name)
+
+
+def _short(values: np.ndarray) -> np.ndarray:
+    """Return values that a message tells exactly."""
+    return fixed_point(values, COARSE)
 
 
 def _quaternion(rng: np.random.Generator) -> np.ndarray:
@@ -97,8 +104,8 @@ def test_sensor_messages_have_one_stamp_and_the_names_and_frame_of_the_body(rng:
 def test_centres_of_pressure_are_the_cells_weighted_by_their_forces(rng: np.random.Generator) -> None:
     cells = np.array([[20.0, 20.0, 20.0, 20.0], [0.0, 0.0, 0.0, 50.0]])
     _, _, forces = sensors_to_messages(dataclasses.replace(_sensors(rng), foot_cells=cells), CELLS)
-    np.testing.assert_allclose(forces.left_cop, CELLS[0].mean(axis=0))
-    np.testing.assert_allclose(forces.right_cop, CELLS[1, 3])
+    np.testing.assert_allclose(forces.left_cop, CELLS[0].mean(axis=0), atol=2.0**-17)
+    np.testing.assert_allclose(forces.right_cop, CELLS[1, 3], atol=2.0**-17)
 
 
 def test_a_foot_in_the_air_has_no_centre_of_pressure(rng: np.random.Generator) -> None:
@@ -117,8 +124,16 @@ def test_joints_in_another_order_are_refused(rng: np.random.Generator) -> None:
 
 @pytest.mark.parametrize("names", [LEG_JOINTS, ("head_pan", "head_tilt"), ()])
 def test_joint_commands_survive(rng: np.random.Generator, names: tuple[str, ...]) -> None:
-    command = JointCommand(2**32 - 1, STAMP, names, *(rng.uniform(0.0, 9.0, len(names)) for _ in range(5)))
+    command = JointCommand(2**32 - 1, STAMP, names, *(_short(rng.uniform(0.0, 9.0, len(names))) for _ in range(5)))
     _assert_equal(joint_command_from_message(_sent(joint_command_to_message(command))), command)
+
+
+def test_joint_commands_are_told_in_steps_that_no_joint_notices(rng: np.random.Generator) -> None:
+    command = JointCommand(1, STAMP, LEG_JOINTS, *(rng.uniform(-9.0, 9.0, 12) for _ in range(5)))
+    told = joint_command_from_message(joint_command_to_message(command))
+    assert np.abs(told.position - command.position).max() <= 2.0**-17
+    assert np.abs(told.velocity - command.velocity).max() <= 2.0**-11
+    assert np.abs(told.effort - command.effort).max() <= 2.0**-11
 
 
 @pytest.mark.parametrize("mode", WalkMode)
@@ -143,9 +158,11 @@ def test_odometry_survives_without_the_distance(rng: np.random.Generator) -> Non
 
 def test_motion_state_survives_with_its_distance(rng: np.random.Generator) -> None:
     sizes = {"com": 3, "dcm": 2, "zmp": 2, "com_velocity": 3, "joint_positions": 12, "joint_velocities": 12}
-    arrays = {name: rng.normal(size=size) for name, size in sizes.items()}
-    arrays |= {f"{name}_desired": rng.normal(size=size) for name, size in sizes.items()}
-    arrays |= {name: rng.normal(size=12) for name in ("torque_feedback", "torque_feedforward", "torque_learned")}
+    arrays = {name: _short(rng.normal(size=size)) for name, size in sizes.items()}
+    arrays |= {f"{name}_desired": _short(rng.normal(size=size)) for name, size in sizes.items()}
+    arrays |= {
+        name: _short(rng.normal(size=12)) for name in ("torque_feedback", "torque_feedforward", "torque_learned")
+    }
     arrays["zmp"] = np.full(2, np.nan)  # without contact
     state = MotionState(
         stamp=STAMP,
@@ -153,7 +170,7 @@ def test_motion_state_survives_with_its_distance(rng: np.random.Generator) -> No
         support=Support.LEFT,
         phase=0.25,
         step_count=17,
-        soles=rng.normal(size=(2, 4, 4)),
+        soles=_short(rng.normal(size=(2, 4, 4))),
         reason="leans by 0.9 rad",
         **arrays,
     )
