@@ -162,8 +162,9 @@ class Backdrop:
         rows = np.flatnonzero(directions[2].max(axis=1) * nearest + height > 0.0)
         if not len(rows):
             return
-        first, last = max(int(rows[0]) - 1, 0), min(int(rows[-1]) + 2, self._shape[0])
-        last = max(last, first + 3)
+        # Three rows of blocks at least, since the outer ones are left out in the end.
+        first = max(min(int(rows[0]) - 1, self._shape[0] - 3), 0)
+        last = max(min(int(rows[-1]) + 2, self._shape[0]), first + 3)
         dx, dy, dz = directions[:, first:last]
         # Where the ray meets the cylinder x^2 + y^2 = R^2: the greater root of a quadratic in the range.
         a = np.maximum(dx * dx + dy * dy, np.float32(1e-6))

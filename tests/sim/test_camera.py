@@ -346,6 +346,14 @@ def test_every_head_pose_gives_a_picture_even_of_a_robot_that_lies_on_the_ground
         assert picture.std() > 2.0  # more than one flat colour without noise would have
 
 
+@pytest.mark.parametrize("height", [0.05, 0.5])
+def test_a_camera_on_its_head_can_see_the_wall_in_any_number_of_rows(renderer, height):
+    """Of a robot that rolls on the ground: the wall comes into the picture from below, row by row."""
+    for tilt in np.radians(np.arange(0.0, 90.0, 0.5)):
+        camera = _camera(1.0, 0.5, height, 0.3, tilt, roll=math.pi)
+        assert renderer.render_scene(camera, Scene(None)).shape == (480, 640, 3)
+
+
 def test_contact_shadow_darkens_the_carpet_beside_the_ball_and_fades_when_it_is_lifted(pinhole):
     camera = _camera(-1.0, 0.0, 1.16, 0.0, 0.7)
     pixel = PINHOLE.project((np.array([[0.44, 0.06, 0.0]]) - camera[:3, 3]) @ camera[:3, :3])[0].round().astype(int)
