@@ -81,6 +81,8 @@ def main(
         print(f"robot {chosen} (with --robot: {others})")
     if recording.runs > 1:
         print(f"time began anew {recording.runs - 1} times in this recording; the table holds the longest part")
+    for line in recording.remarks:
+        print(f"note: {line}")
     for line in table.left_out:
         print(f"left out, not in the recording: {line}")
     kinds = [column.alignment.value for column in table.columns[1:]]

@@ -68,6 +68,8 @@ def main(
         raise typer.Exit(INTERRUPTED) from None
     if others:
         print(f"robot {chosen} (with --robot: {', '.join(others)})")
+    for line in report.remarks:
+        print(f"note: {line}")
     for each in report.left_out:
         print(f"left out: {each.title} ({each.why})")
     for target in targets:

@@ -74,8 +74,8 @@ document.querySelectorAll("select.choice").forEach((chooser) => chooser.addEvent
   });
 }));
 
-document.querySelectorAll("figure[data-time]").forEach((still) =>
-  still.addEventListener("click", () => showTime(Number(still.dataset.time))));
+document.querySelectorAll("[data-time]").forEach((each) =>
+  each.addEventListener("click", () => showTime(Number(each.dataset.time))));
 
 // Replay --------------------------------------------------------------------------------------------------------------
 // links: frames x links x 7 (position, quaternion x, y, z, w); ball, ball_belief: frames x 3; other, belief:
