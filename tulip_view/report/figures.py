@@ -184,3 +184,9 @@ def spans_of(lane: str, times: Array, labels: list[str], end: float, colours: di
                 found.append(Span(lane, labels[begin], float(times[begin]), until, colours.get(labels[begin], GREY)))
             begin = index
     return found
+
+
+def ink_on(colour: str) -> str:
+    """Return black or white, whichever reads better on a colour like "#0072b2"."""
+    red, green, blue = (int(colour[place : place + 2], 16) / 255.0 for place in (1, 3, 5))
+    return "#ffffff" if 0.3 * red + 0.59 * green + 0.11 * blue < 0.5 else "#1a222b"

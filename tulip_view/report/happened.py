@@ -33,6 +33,7 @@ KICK = "kick asked for"
 PHASE_COLOURS = {"initial": GREY, "ready": SKY, "set": ORANGE, "playing": GREEN, "finished": PURPLE, "penalised": RED}
 MODE_COLOURS = {"limp": GREY, "stand": SKY, "walk": GREEN, "kick": ORANGE, "fallen": RED}
 PALETTE = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED, "#b3a000", "#7f5539", GREY)
+ECHO = 0.5  # [s]
 WRAPPERS = ("until it succeeds",)
 """Nodes of the tree that say nothing about what the robot does."""
 
@@ -73,11 +74,10 @@ def _facts(recording: Recording, events: list[Event]) -> list[tuple[str, str]]:
     """Return the most important numbers, of what the recording tells."""
     facts = [("duration", f"{recording.end - recording.begin:.1f} s")]
     truth, game = recording.get(topics.GROUND_TRUTH), recording.get(topics.GAME_STATE)
-    for track in (truth, game):
-        if track is not None:
-            last = track.messages[-1]
-            facts.append(("score, own : other", f"{last.own_score} : {last.opponent_score}"))
-            break
+    # A recording may end with a goal that only one of them tells any more.
+    told = max((track for track in (truth, game) if track is not None), key=lambda track: track.times[-1], default=None)
+    if told is not None:
+        facts.append(("score, own : other", f"{told.messages[-1].own_score} : {told.messages[-1].opponent_score}"))
     if truth is not None and truth.messages[-1].outcome:
         facts.append(("outcome", truth.messages[-1].outcome))
     if recording.get(topics.DECISION) is not None:
@@ -191,7 +191,24 @@ def _referee(recording: Recording, end: float) -> tuple[list[Span | Mark], list[
         return [], [
             (float(track.times[-1]), "referee", f"a report that cannot be read: {track.messages[-1].data[:60]}")
         ]
+    found = _without_echoes(found)
     return (
         [Mark("referee", text, time, GREY, "the referee's words", "diamond") for time, text in found],
         [(time, "referee", text) for time, text in found],
     )
+
+
+def _without_echoes(said: list[tuple[float, str]]) -> list[tuple[float, str]]:
+    """Return what was said at which time; words that come again and again within ECHO are told once, with how often."""
+    series: list[tuple[float, str, int]] = []
+    newest: dict[str, tuple[int, float]] = {}  # where in `series`, and when it was said last
+    for time, words in said:
+        place, last = newest.get(words, (-1, -np.inf))
+        if time - last <= ECHO:
+            begin, _, count = series[place]
+            series[place] = (begin, words, count + 1)
+        else:
+            place = len(series)
+            series.append((time, words, 1))
+        newest[words] = (place, time)
+    return [(time, words if count == 1 else f"{words}, {count} times") for time, words, count in series]

@@ -81,7 +81,7 @@ document.querySelectorAll("[data-time]").forEach((each) =>
 // links: frames x links x 7 (position, quaternion x, y, z, w); ball, ball_belief: frames x 3; other, belief:
 // frames x 3 (x, y, yaw); boxes: {link, size, centre, colour}. NaN where nothing is known.
 const replay = content.replay;
-const scene = document.getElementById("scene");
+const scene = document.getElementById("stage");
 const faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
   [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]];
 let player = null;

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from plotly.offline import get_plotlyjs
 
 from tulip_view.report.build import Report
-from tulip_view.report.figures import Band, Figure, Line, Mark, Section, Span
+from tulip_view.report.figures import Band, Figure, Line, Mark, Section, Span, ink_on
 
 HELP = (
     "One time runs through the page: the slider of the replay, a click into a diagram of time, on a picture or on an "
@@ -49,6 +49,8 @@ def draw(figure: Figure) -> dict[str, Any]:
     for item in figure.items:
         if isinstance(item, Line):
             traces.append(_line(item, figure))
+            if item.points and item.name:  # points as small as those of the diagram could not be seen in the legend
+                traces.append(_sample(traces[-1]))
         elif isinstance(item, Band):
             traces += _band(item, figure)
     traces += _lanes(figure)
@@ -63,7 +65,6 @@ def draw(figure: Figure) -> dict[str, Any]:
             "yanchor": "bottom",
             "x": 0.0,
             "traceorder": "normal",
-            "itemsizing": "constant",
         },
         "hovermode": "closest",
         "plot_bgcolor": "#ffffff",
@@ -103,6 +104,12 @@ def _line(line: Line, figure: Figure) -> dict[str, Any]:
         trace["fill"] = "toself"
         trace["fillcolor"] = line.colour if not line.name and figure.key == "field" else "rgba(120,130,140,0.15)"
     return _with_choice(trace, line.choice, figure)
+
+
+def _sample(points: dict[str, Any]) -> dict[str, Any]:
+    """Move the entry in the legend from points to a larger one that is nowhere in the diagram; return that."""
+    points.update(showlegend=False, legendgroup=points["name"])
+    return {**points, "x": [None], "y": [None], "showlegend": True, "marker": {**points["marker"], "size": 8}}
 
 
 def _band(band: Band, figure: Figure) -> list[dict[str, Any]]:
@@ -180,12 +187,6 @@ def _lanes(figure: Figure) -> list[dict[str, Any]]:
     return traces
 
 
-def ink_on(colour: str) -> str:
-    """Return black or white, whichever reads better on a colour like "#0072b2"."""
-    red, green, blue = (int(colour[place : place + 2], 16) / 255.0 for place in (1, 3, 5))
-    return "#ffffff" if 0.3 * red + 0.59 * green + 0.11 * blue < 0.5 else "#1a222b"
-
-
 def fitting(label: str, share: float) -> str:
     """Return as much of a name as fits into a bar that takes a share of the width; the mouse tells the rest."""
     room = int(share / LETTER)
@@ -229,7 +230,7 @@ def _section(section: Section) -> str:
         parts.append(f"<dl>{''.join(pairs)}</dl>")
     if section.replay is not None:
         parts.append(
-            '<div id="scene"></div><div class="controls"><button id="play">Play</button>'
+            '<div id="stage"></div><div class="controls"><button id="play">Play</button>'
             '<input id="slider" type="range" min="0" value="0" step="1" aria-label="time">'
             '<output id="now"></output><select id="speed" aria-label="speed"><option value="0.25">0.25 x</option>'
             '<option value="0.5">0.5 x</option><option value="1" selected>1 x</option><option value="2">2 x</option>'

@@ -91,6 +91,12 @@ def replay(recording: Recording, robot: Robot, field: Field) -> Section:
             (*m.ball.position_in_map, field.ball_radius) if m.ball_known else (math.nan,) * 3 for m in world.messages
         ]
         data["ball_belief"] = _columns(world, balls, times, (LAST, LAST, LAST))
+    known = np.flatnonzero(np.isfinite(data["links"]).all(axis=(1, 2)))
+    if not len(known):
+        raise LeftOut(TITLE, "the robot's place and its joints are never known at the same time")
+    shown = slice(known[0], known[-1] + 1)  # it begins and ends with the robot in the picture
+    for name in ("times", "links", "ball", "other", "belief", "ball_belief"):
+        data[name] = data[name][shown]
     note = f"{words} {rate:.0f} frames a second. Turn with the mouse, move with the right button, zoom with the wheel."
     return Section("replay", TITLE, [note], replay=data)
 
