@@ -10,12 +10,12 @@ if __name__ == "__main__":
 import os
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from _progress import progress
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
 from tulip_ros.log_file import Log
@@ -44,13 +44,7 @@ def main(
                 check_target(target, force)
             if png is not None and png.exists() and (not png.is_dir() or (any(png.iterdir()) and not force)):
                 raise BadInputError(f"--png {png} is not an empty folder; name another one, or give --force.")
-            with Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                TimeElapsedColumn(),
-                console=Console(stderr=True),
-                transient=True,
-            ) as bar:
+            with progress() as bar:
                 task = bar.add_task("reading", total=expected_messages(log, chosen, WANTED))
                 report = make_report(
                     log,
@@ -58,8 +52,7 @@ def main(
                     lambda number: bar.advance(task, number),
                     lambda words: bar.update(task, description=words),
                 )
-                bar.update(task, description="writing", total=None)
-                written = write(report, page, pdf, png)
+                written = write(report, page, pdf, png, lambda words: bar.update(task, description=words, total=None))
     except BadInputError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from None
@@ -92,7 +85,7 @@ def check_target(path: Path, force: bool) -> None:
         raise BadInputError(f"Folder {path.parent} cannot be written, or is not there; name another file with --to.")
 
 
-def write(report: Report, page: Path, pdf: bool, png: Path | None) -> list[Path]:
+def write(report: Report, page: Path, pdf: bool, png: Path | None, working: Callable[[str], None]) -> list[Path]:
     """Write all that is wanted; an old file is replaced once the new one is complete.
 
     Raises:
@@ -109,13 +102,16 @@ def write(report: Report, page: Path, pdf: bool, png: Path | None) -> list[Path]
 
     part = page.with_name(page.name + ".part")
     try:
+        working("writing the page")
         part.write_text(make_page(report), encoding="utf-8")
         os.replace(part, page)
         if pdf:
+            working("writing the PDF")
             write_pdf(report, part)
             os.replace(part, page.with_suffix(".pdf"))
         if png is None:
             return []
+        working("writing pictures")
         png.mkdir(parents=True, exist_ok=True)
         return write_pngs(report, png)
     except OSError as error:

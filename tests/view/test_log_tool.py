@@ -37,7 +37,7 @@ def contents(path: Path) -> list[tuple[str, int, bytes]]:
 def test_info_tells_duration_and_rates(recording: Path):
     result = run("info", recording)
     assert result.exit_code == 0
-    assert "3.98 s" in result.stdout and "yes: begun, ended and indexed" in result.stdout
+    assert "3.98 s" in result.stdout and "yes, with its index" in result.stdout
     joint_states = next(line for line in result.stdout.splitlines() if "/joint_states" in line)
     assert joint_states.split()[1:] == ["399", "100.3"]
 
@@ -101,8 +101,8 @@ def test_notes_and_attachments_go_along(tmp_path: Path):
     bag = Bag(tmp_path / "noted")
     bag.add_topic("/referee/report", topics.REPORT.type_name, topics.REPORT.quality)
     bag.write("/referee/report", serialize_message(String(data="{}")), 5)
-    bag._writer.add_metadata("versions", {"git": "abc"})
-    bag._writer.add_attachment(1, 2, "robot.yaml", "text/plain", b"links: []")
+    bag.note("versions", {"git": "abc"})
+    bag.attach("robot.yaml", "text/plain", b"links: []")
     bag.close()
     assert run("cut", tmp_path / "noted", "-o", tmp_path / "cut").exit_code == 0
     with Log(tmp_path / "cut") as log:

@@ -137,6 +137,13 @@ def test_files_hold_the_table(recording: Path, tmp_path: Path, ending: str):
     assert phases == wanted["game_phase"].tolist()
 
 
+def test_all_names_are_legal_in_matlab_and_end_with_their_units():
+    for source in SOURCES:
+        for column in source.columns:
+            assert is_matlab_name(column.name), column.name
+            assert column.name.endswith(UNITS[column.unit]), column.name
+
+
 def test_of_two_robots_one_is_chosen(tmp_path: Path):
     path = write(tmp_path / "two", ("keeper", "striker"), end=200)
     with Log(path) as log:

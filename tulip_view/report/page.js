@@ -17,6 +17,10 @@ function drawFigure(key) {
   const figure = content.figures[key];
   const plot = document.getElementById("figure-" + key);
   if (figure.time && shownRange !== null) figure.layout.xaxis.range = shownRange;
+  if (figure.layout.yaxis.scaleanchor) {  // no empty space above and below on a narrow page
+    figure.layout.height = Math.min(figure.layout.height, 0.75 * plot.clientWidth + 140);
+    plot.style.height = figure.layout.height + "px";
+  }
   Plotly.newPlot(plot, figure.traces, figure.layout, settings);
   plot.dataset.drawn = "yes";
   if (!figure.time) return;

@@ -82,6 +82,7 @@ def draw(figure: Figure) -> dict[str, Any]:
         lanes = list(dict.fromkeys(item.lane for item in figure.items if isinstance(item, Span | Mark)))
         layout["yaxis"].update(type="category", categoryorder="array", categoryarray=lanes[::-1])
         layout["barmode"] = "overlay"
+        layout["uniformtext"] = {"mode": "hide", "minsize": 11}  # of a narrow page
         layout["margin"]["l"] = 72
     return {"traces": traces, "layout": layout, "time": figure.time, "choices": list(figure.choices)}
 
@@ -156,7 +157,6 @@ def _lanes(figure: Figure) -> list[dict[str, Any]]:
                 "textposition": "inside",
                 "insidetextanchor": "middle",
                 "textangle": 0,
-                "constraintext": "none",
                 "textfont": {"color": [ink_on(span.colour) for span in spans], "size": 11},
                 "showlegend": False,
                 "customdata": [f"{s.label}<br>{s.begin:.2f} s to {s.end:.2f} s" for s in spans],
@@ -230,6 +230,7 @@ def _section(section: Section) -> str:
         parts.append(f"<dl>{''.join(pairs)}</dl>")
     if section.replay is not None:
         parts.append(
+            "<p>Turn with the mouse, move with the right button, zoom with the wheel.</p>"
             '<div id="stage"></div><div class="controls"><button id="play">Play</button>'
             '<input id="slider" type="range" min="0" value="0" step="1" aria-label="time">'
             '<output id="now"></output><select id="speed" aria-label="speed"><option value="0.25">0.25 x</option>'

@@ -97,7 +97,7 @@ def replay(recording: Recording, robot: Robot, field: Field) -> Section:
     shown = slice(known[0], known[-1] + 1)  # it begins and ends with the robot in the picture
     for name in ("times", "links", "ball", "other", "belief", "ball_belief"):
         data[name] = data[name][shown]
-    note = f"{words} {rate:.0f} frames a second. Turn with the mouse, move with the right button, zoom with the wheel."
+    note = f"{words} {rate:.0f} frames a second."
     return Section("replay", TITLE, [note], replay=data)
 
 

@@ -148,6 +148,8 @@ def _latencies(recording: Recording, section: Section) -> None:
 def _lost(recording: Recording, section: Section) -> None:
     """Tell what the recorder itself counted: messages that were sent and never reached it."""
     counts = {name: int(count) for name, count in recording.metadata.get(LOST, {}).items() if count.isdigit()}
+    if not counts and recording.log_time_is_stamp:
+        return  # in lockstep nothing can get lost
     if not counts:
         section.words.append("The recorder noted no count of messages that were lost on their way to it.")
     elif any(counts.values()):
