@@ -17,7 +17,7 @@ from typing import Annotated
 import typer
 from _progress import progress
 
-from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
+from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable
 from tulip_ros.log_file import Log
 from tulip_view.recording import choose_robot, expected_messages, robots_in
 from tulip_view.report.build import WANTED, Report, make_report
@@ -81,8 +81,9 @@ def check_target(path: Path, force: bool) -> None:
         raise BadInputError(f"{path} is a folder; expected the name of a file.")
     if path.exists() and not force:
         raise BadInputError(f"{path} exists; name another file with --to, or give --force to replace it.")
-    if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
-        raise BadInputError(f"Folder {path.parent} cannot be written, or is not there; name another file with --to.")
+    if not path.parent.is_dir():
+        raise BadInputError(f"There is no folder {path.parent}; make it, or name another file with --to.")
+    check_writable(path, "--to")
 
 
 def write(report: Report, page: Path, pdf: bool, png: Path | None, working: Callable[[str], None]) -> list[Path]:

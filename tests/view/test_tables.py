@@ -179,7 +179,8 @@ def test_after_time_began_anew_the_longest_part_counts(tmp_path: Path):
         (("--to", "t.csv", "--rate", "1e9"), "expected at most"),
         (("--to", "t.csv", "--rate", "5", "--times-of", "odometry"), "expected one of them"),
         (("--to", "t.csv", "--times-of", "joint_state"), "Did you mean joint_states"),
-        (("--to", "no/such/folder/t.csv"), "cannot be written"),
+        (("--to", "no/such/folder/t.csv"), "There is no folder no/such/folder"),
+        (("--to", "/proc/t.csv"), "/proc/t.csv cannot be written"),
     ],
 )
 def test_bad_choices_are_told(

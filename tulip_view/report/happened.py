@@ -29,6 +29,7 @@ from tulip_view.report.figures import (
 )
 
 TITLE = "What happened"
+TOLD_BY = (topics.GAME_STATE, topics.DECISION, topics.MOTION_STATE, topics.GROUND_TRUTH, topics.REPORT)
 KICK = "kick asked for"
 PHASE_COLOURS = {"initial": GREY, "ready": SKY, "set": ORANGE, "playing": GREEN, "finished": PURPLE, "penalised": RED}
 MODE_COLOURS = {"limp": GREY, "stand": SKY, "walk": GREEN, "kick": ORANGE, "fallen": RED}
@@ -54,10 +55,12 @@ def happened(recording: Recording) -> Section:
         spans, found = add(recording, end)
         items += spans
         events += found
-    if not items and not events:
-        raise LeftOut(TITLE, "none of game_state, decision, motion_state, ground_truth and referee/report is recorded")
+    if all(recording.get(topic) is None for topic in TOLD_BY):
+        raise LeftOut(TITLE, f"none of {', '.join(topic.name for topic in TOLD_BY)} is recorded")
     events.sort(key=lambda event: event[0])
     section = Section("happened", TITLE)
+    if not events:
+        section.words.append("No change of the game, decision, kick, touch, goal or fall was recorded.")
     if items:
         lanes = list(dict.fromkeys(item.lane for item in items))
         figure = Figure("timeline", "Timeline", "time [s]", "", list(items), height=90 + 46 * len(lanes))

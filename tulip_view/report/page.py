@@ -20,7 +20,7 @@ HELP = (
     "event sets it; the vertical line shows it. Drag over a diagram to zoom, in time in all of them; a double click "
     "shows all again; a click on a name in a legend hides its line."
 )
-LETTER = 0.0065  # of the timeline's width that one letter takes
+LETTER = 0.0078  # of the timeline's width that one letter takes
 LEAST_LETTERS = 6  # fewer do not tell a name
 
 

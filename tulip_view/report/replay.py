@@ -82,7 +82,8 @@ def replay(recording: Recording, robot: Robot, field: Field) -> Section:
         ]
         data["other"] = _columns(truth, others, times, (LINEAR, LINEAR, ANGLE))
         data["other_boxes"] = [
-            {"size": part.size, "centre": part.centre, "colour": COLOURS[part.colour]} for part in keeper_parts()
+            {"size": part.size, "centre": part.centre, "colour": COLOURS[part.colour]}
+            for part in keeper_parts("magenta")  # the own robot is drawn with cyan marks
         ]
     if world is not None:
         poses = [tuple(m.robot_pose) for m in world.messages]
