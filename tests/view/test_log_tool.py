@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import log as log_tool
@@ -146,6 +147,13 @@ def test_an_old_recording_stays_when_the_new_one_fails(recording: Path, tmp_path
     result = run("cut", damaged, "-o", part, "--force")
     assert result.exit_code == 2 and "recover.py" in result.stderr
     assert contents(part) == before
+
+
+def test_nothing_is_left_where_the_disk_is_full(recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: shutil._ntuple_diskusage(10**9, 10**9 - 10**6, 10**6))
+    result = run("cut", recording, "-o", tmp_path / "part")
+    assert result.exit_code == 2 and "are free at" in result.stderr
+    assert not (tmp_path / "part").exists()
 
 
 def test_topics_of_two_types_are_not_merged(recording: Path, tmp_path: Path):

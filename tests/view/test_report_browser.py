@@ -45,6 +45,15 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the screenshots: the one that TULIP_TEST_PICTURES names, to look at them afterwards."""
+    named = os.environ.get("TULIP_TEST_PICTURES")
+    folder = Path(named) if named else tmp_path_factory.mktemp("pictures")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     # A browser that runs as root has no sandbox; the only page that it opens is our own.
     sandbox = ("--no-sandbox",) if os.getuid() == 0 else ()
@@ -98,7 +107,7 @@ def opened(browser: Any, file: Path) -> Iterator[Opened]:
     found.page.close()
 
 
-def test_the_page_shows_every_section_and_draws_every_figure(opened: Opened, tmp_path: Path):
+def test_the_page_shows_every_section_and_draws_every_figure(opened: Opened, pictures: Path):
     sections = opened.page.evaluate("[...document.querySelectorAll('section')].map((each) => each.id)")
     assert sections == SECTIONS
     for name in sections:
@@ -106,7 +115,7 @@ def test_the_page_shows_every_section_and_draws_every_figure(opened: Opened, tmp
         opened.page.wait_for_function(
             "(name) => [...document.querySelectorAll(`#${name} .plot`)].every((plot) => plot.dataset.drawn)", arg=name
         )
-        picture = opened.picture(f"section#{name}", tmp_path / f"{name}.png")
+        picture = opened.picture(f"section#{name}", pictures / f"{name}.png")
         assert picture.std() > 5.0, name  # not one colour
     pieces = opened.page.evaluate(
         "[...document.querySelectorAll('.plot')].map((plot) => [plot.id, plot.querySelectorAll('.trace').length])"
@@ -119,28 +128,28 @@ def test_the_page_asks_for_nothing_but_itself_and_reports_no_error(opened: Opene
     assert opened.errors == []
 
 
-def test_the_replay_begins_with_the_robot_in_the_picture(opened: Opened, tmp_path: Path):
+def test_the_replay_begins_with_the_robot_in_the_picture(opened: Opened, pictures: Path):
     opened.page.evaluate("document.getElementById('replay').scrollIntoView()")
     opened.show(0)
     corners = opened.robot()
     assert np.isfinite(corners).all() and 1.0 < np.ptp(corners[:, 2]) < 1.6  # it stands
-    seen = opened.picture("#stage", tmp_path / "scene.png")
+    seen = opened.picture("#stage", pictures / "scene.png")
     height, width = seen.shape[:2]
     middle = seen[height // 4 : 3 * height // 4, 2 * width // 5 : 3 * width // 5].astype(int)
     grey = np.ptp(middle, axis=2) < 30  # the robot's boxes are grey and black, all else has a colour
     assert grey.mean() > 0.15
 
 
-def test_the_robot_moves_when_the_slider_moves(opened: Opened, tmp_path: Path):
+def test_the_robot_moves_when_the_slider_moves(opened: Opened, pictures: Path):
     opened.page.evaluate("document.getElementById('replay').scrollIntoView()")
     last = int(opened.page.evaluate("Number(document.getElementById('slider').max)"))
     opened.show(0)
-    corners, picture = opened.robot(), opened.picture("#stage", tmp_path / "first.png")
+    corners, picture = opened.robot(), opened.picture("#stage", pictures / "first.png")
     opened.show(last)
     assert opened.page.evaluate("now") == pytest.approx(1.3, abs=0.1)
     moved = np.abs(opened.robot() - corners).max()
     assert moved > 0.002  # [m] it sways, and turns its head
-    assert np.abs(opened.picture("#stage", tmp_path / "last.png").astype(int) - picture).max() > 30
+    assert np.abs(opened.picture("#stage", pictures / "last.png").astype(int) - picture).max() > 30
     opened.show(0)
     assert opened.robot() == pytest.approx(corners, abs=1e-6)
 
@@ -170,10 +179,10 @@ def test_the_chosen_joint_is_the_one_that_is_shown(opened: Opened):
     assert shown and set(shown) == {"right knee"}
 
 
-def test_nothing_is_wider_than_a_narrow_window(browser: Any, file: Path, tmp_path: Path):
+def test_nothing_is_wider_than_a_narrow_window(browser: Any, file: Path, pictures: Path):
     narrow = Opened(browser, file, 480)
     try:
         assert narrow.page.evaluate("document.documentElement.scrollWidth") <= 480
-        narrow.page.screenshot(path=str(tmp_path / "narrow.png"))
+        narrow.page.screenshot(path=str(pictures / "narrow.png"))
     finally:
         narrow.page.close()

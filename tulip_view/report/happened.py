@@ -30,7 +30,7 @@ from tulip_view.report.figures import (
 
 TITLE = "What happened"
 TOLD_BY = (topics.GAME_STATE, topics.DECISION, topics.MOTION_STATE, topics.GROUND_TRUTH, topics.REPORT)
-KICK = "kick asked for"
+KICK, TOUCH, FALL = "kick asked for", "touch of the ball", "fall"
 PHASE_COLOURS = {"initial": GREY, "ready": SKY, "set": ORANGE, "playing": GREEN, "finished": PURPLE, "penalised": RED}
 MODE_COLOURS = {"limp": GREY, "stand": SKY, "walk": GREEN, "kick": ORANGE, "fallen": RED}
 PALETTE = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED, "#b3a000", "#7f5539", GREY)
@@ -86,8 +86,8 @@ def _facts(recording: Recording, events: list[Event]) -> list[tuple[str, str]]:
     if recording.get(topics.DECISION) is not None:
         facts.append(("kicks asked for", str(sum(what.startswith(KICK) for _, _, what in events))))
     if truth is not None:
-        for name, field in (("touches of the ball", "touches"), ("falls", "falls")):
-            facts.append((name, str(int(getattr(truth.messages[-1], field)))))
+        for name, event in (("touches of the ball", TOUCH), ("falls", FALL)):  # the truth's own count may begin anew
+            facts.append((name, str(sum(what == event for _, _, what in events))))
     elif recording.get(topics.MOTION_STATE) is not None:
         facts.append(("falls that it noticed", str(sum(what.startswith("fallen") for _, _, what in events))))
     return facts
@@ -163,8 +163,8 @@ def _truth(recording: Recording, end: float) -> tuple[list[Span | Mark], list[Ev
     items: list[Span | Mark] = []
     events = []
     for name, what, colour, symbol in (
-        ("touches", "touch of the ball", BLUE, "circle"),
-        ("falls", "fall", RED, "x"),
+        ("touches", TOUCH, BLUE, "circle"),
+        ("falls", FALL, RED, "x"),
         ("own_score", "goal", GREEN, "star"),
         ("opponent_score", "goal of the opponent", PURPLE, "triangle-up"),
     ):

@@ -6,6 +6,7 @@ import math
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import cv2
@@ -52,12 +53,11 @@ def write_pngs(report: Report, folder: Path) -> list[Path]:
     Raises:
         OSError: if one cannot be written.
     """
-    written = []
-    for name, canvas in canvases(report):
-        FigureCanvasAgg(canvas)
-        written.append(folder / f"{name}.png")
-        canvas.savefig(written[-1], dpi=DPI)
-    return written
+    with TemporaryDirectory(dir=folder, prefix=".part") as part:  # all or none come to stay
+        for name, canvas in canvases(report):
+            FigureCanvasAgg(canvas)
+            canvas.savefig(Path(part) / f"{name}.png", dpi=DPI)
+        return [path.replace(folder / path.name) for path in sorted(Path(part).iterdir())]
 
 
 def canvases(report: Report) -> Iterator[Named]:
