@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from _progress import progress
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
 from tulip_ros.log_file import Log
@@ -40,7 +39,6 @@ def main(
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there already.")] = False,
 ) -> None:
     """Export; positions, speeds and torques are interpolated, states and decisions are those of the last message."""
-    console = Console(stderr=True)
     try:
         if rate is not None and times_of is not None:
             raise BadInputError("--rate and --times-of are two ways to choose the rows; expected one of them.")
@@ -52,8 +50,7 @@ def main(
             chosen = choose_robot(log, robot)
             native = None if times_of is None else times_of.removeprefix(f"/{chosen}/").lstrip("/")
             wanted = topics_of(sources, native)
-            columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-            with Progress(*columns, console=console, transient=True) as bar:
+            with progress() as bar:
                 task = bar.add_task("reading", total=expected_messages(log, chosen, wanted))
                 recording = read(log, chosen, wanted, lambda number: bar.advance(task, number))
                 bar.update(task, description="aligning", total=None)
@@ -81,6 +78,8 @@ def main(
         print(f"robot {chosen} (with --robot: {others})")
     if recording.runs > 1:
         print(f"time began anew {recording.runs - 1} times in this recording; the table holds the longest part")
+    for line in recording.remarks:
+        print(f"note: {line}")
     for line in table.left_out:
         print(f"left out, not in the recording: {line}")
     kinds = [column.alignment.value for column in table.columns[1:]]

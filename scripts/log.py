@@ -20,9 +20,9 @@ from typing import Annotated
 
 import typer
 import yaml
+from _progress import progress
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, unknown
@@ -71,17 +71,6 @@ def output() -> Console:
     return Console() if sys.stdout.isatty() else Console(width=WIDE)
 
 
-def progress() -> Progress:
-    """Return a bar on the error output: the standard one may be redirected into a file."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-    )
-    return Progress(*columns, console=Console(stderr=True), transient=True)
-
-
 @app.command()
 def info(files: Recordings) -> None:
     """Tell how long, how large and whole recordings are, what is in them, and what their recorder noted."""
@@ -106,7 +95,7 @@ def show_info(log: Log, console: Console) -> None:
     size = sum(file.stat().st_size for file in log.files)
     table = Table(title=escape(str(log.path)), show_header=False, title_justify="left")
     rows = [
-        ("whole", "yes: begun, ended and indexed"),
+        ("ended", "yes, with its index; what is inside is checked when it is read, as by `topics`"),
         ("files", ", ".join(f"{file.name} ({file.stat().st_size / MIB:.1f} MiB)" for file in log.files)),
         ("size", f"{size / MIB:.1f} MiB" + (f", {size / MIB / duration * 60.0:.1f} MiB a minute" if duration else "")),
         ("duration", f"{duration:.2f} s"),

@@ -10,14 +10,14 @@ if __name__ == "__main__":
 import os
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from _progress import progress
 
-from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
+from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable
 from tulip_ros.log_file import Log
 from tulip_view.recording import choose_robot, expected_messages, robots_in
 from tulip_view.report.build import WANTED, Report, make_report
@@ -44,13 +44,7 @@ def main(
                 check_target(target, force)
             if png is not None and png.exists() and (not png.is_dir() or (any(png.iterdir()) and not force)):
                 raise BadInputError(f"--png {png} is not an empty folder; name another one, or give --force.")
-            with Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                TimeElapsedColumn(),
-                console=Console(stderr=True),
-                transient=True,
-            ) as bar:
+            with progress() as bar:
                 task = bar.add_task("reading", total=expected_messages(log, chosen, WANTED))
                 report = make_report(
                     log,
@@ -58,8 +52,7 @@ def main(
                     lambda number: bar.advance(task, number),
                     lambda words: bar.update(task, description=words),
                 )
-                bar.update(task, description="writing", total=None)
-                written = write(report, page, pdf, png)
+                written = write(report, page, pdf, png, lambda words: bar.update(task, description=words, total=None))
     except BadInputError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from None
@@ -68,6 +61,8 @@ def main(
         raise typer.Exit(INTERRUPTED) from None
     if others:
         print(f"robot {chosen} (with --robot: {', '.join(others)})")
+    for line in report.remarks:
+        print(f"note: {line}")
     for each in report.left_out:
         print(f"left out: {each.title} ({each.why})")
     for target in targets:
@@ -86,11 +81,12 @@ def check_target(path: Path, force: bool) -> None:
         raise BadInputError(f"{path} is a folder; expected the name of a file.")
     if path.exists() and not force:
         raise BadInputError(f"{path} exists; name another file with --to, or give --force to replace it.")
-    if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
-        raise BadInputError(f"Folder {path.parent} cannot be written, or is not there; name another file with --to.")
+    if not path.parent.is_dir():
+        raise BadInputError(f"There is no folder {path.parent}; make it, or name another file with --to.")
+    check_writable(path, "--to")
 
 
-def write(report: Report, page: Path, pdf: bool, png: Path | None) -> list[Path]:
+def write(report: Report, page: Path, pdf: bool, png: Path | None, working: Callable[[str], None]) -> list[Path]:
     """Write all that is wanted; an old file is replaced once the new one is complete.
 
     Raises:
@@ -107,13 +103,16 @@ def write(report: Report, page: Path, pdf: bool, png: Path | None) -> list[Path]
 
     part = page.with_name(page.name + ".part")
     try:
+        working("writing the page")
         part.write_text(make_page(report), encoding="utf-8")
         os.replace(part, page)
         if pdf:
+            working("writing the PDF")
             write_pdf(report, part)
             os.replace(part, page.with_suffix(".pdf"))
         if png is None:
             return []
+        working("writing pictures")
         png.mkdir(parents=True, exist_ok=True)
         return write_pngs(report, png)
     except OSError as error:

@@ -83,7 +83,13 @@ def writing(folder: Path) -> Iterator[Bag]:
     Raises:
         BadInputError: if it cannot be written.
     """
-    bag = Bag(folder)
+    existed = folder.exists()
+    try:
+        bag = Bag(folder)
+    except BaseException:
+        if not existed and folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+        raise
     try:
         yield bag
         bag.close()

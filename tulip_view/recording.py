@@ -20,6 +20,7 @@ from tulip_ros import topics
 from tulip_ros.errors import BadInputError, unknown
 from tulip_ros.log_file import Log, LoggedTopic, Record
 from tulip_ros.timeline import Arrival, Timeline
+from tulip_view.older_messages import installed, told
 
 Array = NDArray[np.float64]
 Advance = Callable[[int], None]
@@ -71,12 +72,14 @@ class Track:
         arrivals: (n,) when they came to the recorder, on the same axis [s].
         wall: (n,) when they came, by the recorder's own clock [s].
         messages: n of them; none if only times were wanted.
+        logged: (n,) when they came, as the recording has it [ns].
     """
 
     times: Array
     arrivals: Array
     wall: Array
     messages: list[Any] = field(default_factory=list)
+    logged: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __len__(self) -> int:
         return len(self.times)
@@ -99,6 +102,7 @@ class Recording:
         runs: How often time began anew in it, plus one; the tracks hold the longest run alone.
         log_time_is_stamp: Whether the recorder's clock was that of the stamps, as in lockstep and on a robot.
         metadata: What the recorder noted.
+        remarks: Topics that are not, or not wholly, what they should be, in sentences.
     """
 
     path: Path
@@ -109,6 +113,7 @@ class Recording:
     runs: int
     log_time_is_stamp: bool
     metadata: dict[str, dict[str, str]]
+    remarks: list[str] = field(default_factory=list)
 
     def get(self, topic: topics.Topic) -> Track | None:
         """Return a topic's messages, or None where the recording has none."""
@@ -176,7 +181,9 @@ def read(log: Log, robot: str, wanted: Mapping[str, Wanted], advance: Advance = 
     Raises:
         BadInputError: if the recording is damaged, or a message does not fit its type.
     """
-    names = _full_names(log, robot, wanted)
+    names, remarks = _full_names(log, robot, wanted)
+    kinds = {topic.name: topic.message for topic in topics.TOPICS}
+    lacking: dict[str, set[str]] = {name: set() for name in names.values()}
     runs: list[dict[str, list[tuple[int | None, int, Any]]]] = [{}]
     timeline = Timeline()
     stamped = {full: _begins_with_stamp(log.topics[full]) for full in names}
@@ -192,28 +199,54 @@ def read(log: Log, robot: str, wanted: Mapping[str, Wanted], advance: Advance = 
             if arrival is Arrival.ANEW:
                 runs.append({})
         how = wanted.get(name, ALL)
-        message = log.decode(record) if how.decoded else None
+        message = installed(log.decode(record), kinds[name], lacking[name]) if how.decoded else None
         runs[-1].setdefault(name, []).append((stamp, record.log_time, message))
     longest = max(runs, key=lambda run: sum(map(len, run.values())))
-    return _assemble(log, robot, longest, len(runs))
+    remarks += [
+        f"{name} was recorded with another definition of its type; told as 0 or empty: {told(fields)}."
+        for name, fields in lacking.items()
+        if fields
+    ]
+    return _assemble(log, robot, longest, len(runs), remarks)
+
+
+def message_at(log: Log, recording: Recording, topic: topics.Topic, index: int) -> Any:
+    """Return one message of a topic whose times alone were read.
+
+    Raises:
+        BadInputError: if the recording is damaged, or the message does not fit its type.
+    """
+    full = _full_name(topic.name, recording.robot)
+    logged = int(recording.tracks[topic.name].logged[index])
+    record = next(log.records([full], logged, logged + 1))
+    return installed(log.decode(record), topic.message, set())
 
 
 def expected_messages(log: Log, robot: str, wanted: Mapping[str, Wanted]) -> int:
     """Return how many messages `read` will look at."""
-    return sum(log.topics[name].messages for name in _full_names(log, robot, wanted))
+    return sum(log.topics[name].messages for name in _full_names(log, robot, wanted)[0])
 
 
-def _full_names(log: Log, robot: str, wanted: Mapping[str, Wanted]) -> dict[str, str]:
-    """Return the names that the recording has of what is wanted, and the clock, by their full names."""
-    names = {}
-    for name in wanted:
-        within = robot and name not in SHARED
-        full = f"/{robot}/{name}" if within else f"/{name}"
-        if full in log.topics:
+def _full_names(log: Log, robot: str, wanted: Mapping[str, Wanted]) -> tuple[dict[str, str], list[str]]:
+    """Return the names that the recording has of what is wanted, and the clock, by their full names; and remarks."""
+    names, remarks = {}, []
+    types = {topic.name: topic.type_name for topic in topics.TOPICS}
+    for name in (*wanted, CLOCK):
+        full = _full_name(name, robot)
+        if full not in log.topics:
+            continue
+        found = log.topics[full].type_name
+        if found == types.get(name, found):
             names[full] = name
-    if CLOCK in log.topics:
-        names[CLOCK] = CLOCK
-    return names
+        else:
+            remarks.append(f"{full} is {found}, where {types[name]} was expected; it was not read.")
+    return names, remarks
+
+
+def _full_name(name: str, robot: str) -> str:
+    if name.startswith("/"):
+        return name
+    return f"/{robot}/{name}" if robot and name not in SHARED else f"/{name}"
 
 
 def _begins_with_stamp(topic: LoggedTopic) -> bool:
@@ -232,7 +265,9 @@ def _stamp(record: Record) -> int | None:
     return (seconds * 10**9 + nanoseconds) or None
 
 
-def _assemble(log: Log, robot: str, run: dict[str, list[tuple[int | None, int, Any]]], runs: int) -> Recording:
+def _assemble(
+    log: Log, robot: str, run: dict[str, list[tuple[int | None, int, Any]]], runs: int, remarks: list[str]
+) -> Recording:
     known = _clock(run)
     run.pop(CLOCK, None)
     stamps = [stamp for name in STEADY for stamp, _, _ in run.get(name, ()) if stamp is not None]
@@ -249,10 +284,11 @@ def _assemble(log: Log, robot: str, run: dict[str, list[tuple[int | None, int, A
         # Latched messages may carry stamps of long ago.
         order = np.argsort(times, kind="stable")
         messages = [entries[index][2] for index in order if entries[index][2] is not None]
-        tracks[name] = Track(times[order], arrivals[order], logged[order], messages)
+        stored = np.array([log_time for _, log_time, _ in entries], dtype=np.int64)[order]
+        tracks[name] = Track(times[order], arrivals[order], logged[order], messages, stored)
     robots = robots_in(log)
     same = all(abs(log_time - stamp) < SAME for log_time, stamp in known)
-    return Recording(log.path, robot, robots, tracks, origin, runs, same, log.metadata)
+    return Recording(log.path, robot, robots, tracks, origin, runs, same, log.metadata, remarks)
 
 
 def _clock(run: dict[str, list[tuple[int | None, int, Any]]]) -> list[tuple[int, int]]:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.io import savemat
 
-from tulip_ros.errors import BadInputError
+from tulip_ros.errors import BadInputError, check_writable
 from tulip_view.tables import Table
 
 MATLAB_NAME = re.compile(r"[A-Za-z]\w*$", re.ASCII)
@@ -43,8 +43,9 @@ def check_target(path: Path, force: bool) -> None:
             raise BadInputError(f"{file} is a folder; expected the name of a file.")
         if file.exists() and not force:
             raise BadInputError(f"{file} exists; name another file, or give --force to replace it.")
-    if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
-        raise BadInputError(f"Folder {path.parent} cannot be written, or is not there; make it, or name another one.")
+    if not path.parent.is_dir():
+        raise BadInputError(f"There is no folder {path.parent}; make it, or name another file with --to.")
+    check_writable(path, "--to")
 
 
 def files_of(path: Path) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import log as log_tool
@@ -37,7 +38,7 @@ def contents(path: Path) -> list[tuple[str, int, bytes]]:
 def test_info_tells_duration_and_rates(recording: Path):
     result = run("info", recording)
     assert result.exit_code == 0
-    assert "3.98 s" in result.stdout and "yes: begun, ended and indexed" in result.stdout
+    assert "3.98 s" in result.stdout and "yes, with its index" in result.stdout
     joint_states = next(line for line in result.stdout.splitlines() if "/joint_states" in line)
     assert joint_states.split()[1:] == ["399", "100.3"]
 
@@ -101,8 +102,8 @@ def test_notes_and_attachments_go_along(tmp_path: Path):
     bag = Bag(tmp_path / "noted")
     bag.add_topic("/referee/report", topics.REPORT.type_name, topics.REPORT.quality)
     bag.write("/referee/report", serialize_message(String(data="{}")), 5)
-    bag._writer.add_metadata("versions", {"git": "abc"})
-    bag._writer.add_attachment(1, 2, "robot.yaml", "text/plain", b"links: []")
+    bag.note("versions", {"git": "abc"})
+    bag.attach("robot.yaml", "text/plain", b"links: []")
     bag.close()
     assert run("cut", tmp_path / "noted", "-o", tmp_path / "cut").exit_code == 0
     with Log(tmp_path / "cut") as log:
@@ -146,6 +147,13 @@ def test_an_old_recording_stays_when_the_new_one_fails(recording: Path, tmp_path
     result = run("cut", damaged, "-o", part, "--force")
     assert result.exit_code == 2 and "recover.py" in result.stderr
     assert contents(part) == before
+
+
+def test_nothing_is_left_where_the_disk_is_full(recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: shutil._ntuple_diskusage(10**9, 10**9 - 10**6, 10**6))
+    result = run("cut", recording, "-o", tmp_path / "part")
+    assert result.exit_code == 2 and "are free at" in result.stderr
+    assert not (tmp_path / "part").exists()
 
 
 def test_topics_of_two_types_are_not_merged(recording: Path, tmp_path: Path):

@@ -13,21 +13,26 @@ import numpy as np
 import pytest
 import report as report_script
 import typer
+from rclpy.serialization import serialize_message
 from recordings_to_view import play, write
 from typer.testing import CliRunner, Result
 
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.robot import load_robot
 from tulip_ros import topics
+from tulip_ros.bag import Bag
 from tulip_ros.log_file import Log
-from tulip_view.recording import Recording, read
+from tulip_ros.time import from_message
+from tulip_view.recording import Recording, message_at, read
 from tulip_view.report.build import WANTED, Report, make_report
 from tulip_view.report.field_paths import ellipse
-from tulip_view.report.happened import doing
-from tulip_view.report.page import fitting, make_page, packed
+from tulip_view.report.figures import Band, Figure, ink_on
+from tulip_view.report.happened import _without_echoes, doing
+from tulip_view.report.page import draw, fitting, make_page, packed
 from tulip_view.report.paper import write_pdf
 from tulip_view.report.stills import _head
 from tulip_view.report.timing import gaps
+from tulip_vision.messages import picture_to_message
 
 pytestmark = pytest.mark.sim
 
@@ -93,13 +98,15 @@ def test_data_in_the_page_is_what_was_recorded(page: str, recording: Recording):
     assert np.frombuffer(base64.b64decode(knee["x"]["bdata"]), dtype="<f4") == pytest.approx(track.times, abs=1e-6)
 
 
-def test_stills_have_the_detections_of_their_stamp_drawn_in(report: Report, recording: Recording):
+def test_stills_have_the_detections_of_their_stamp_drawn_in(report: Report, recording: Recording, trial: Path):
     stills = next(section for section in report.sections if section.key == "stills").stills
     pictures, features = recording.get(topics.CAMERA_COMPRESSED), recording.get(topics.FEATURES)
     assert pictures is not None and features is not None and len(stills) >= 5
     for still in stills:
         index = int(np.argmin(np.abs(pictures.times - still.time)))
-        raw = cv2.imdecode(np.frombuffer(bytes(pictures.messages[index].data), np.uint8), cv2.IMREAD_COLOR)
+        with Log(trial) as log:
+            message = message_at(log, recording, topics.CAMERA_COMPRESSED, index)
+        raw = cv2.imdecode(np.frombuffer(bytes(message.data), np.uint8), cv2.IMREAD_COLOR)
         drawn = cv2.imdecode(np.frombuffer(still.jpeg, np.uint8), cv2.IMREAD_COLOR)
         assert raw is not None and drawn is not None
         found = features.messages[int(np.argmin(np.abs(features.times - still.time)))].features
@@ -199,6 +206,46 @@ def test_an_ellipse_holds_its_share_of_samples():
     distance = np.einsum("ni,ij,nj->n", offset, np.linalg.inv(covariance), offset)
     assert distance == pytest.approx(4.0)  # 2 sigma
     assert ellipse(np.zeros(2), np.eye(2) * 1e6) is None
+
+
+def test_words_that_come_again_and_again_are_told_once():
+    said = [(0.1 * number, "too early") for number in range(10)] + [(0.35, "goal"), (5.0, "too early")]
+    assert _without_echoes(sorted(said)) == [(0.0, "too early, 10 times"), (0.35, "goal"), (5.0, "too early")]
+
+
+def test_a_band_with_a_gap_is_drawn_in_two_pieces():
+    low, x = np.array([0.0, 0.1, math.nan, 0.3, 0.4]), np.arange(5.0)
+    (trace,) = draw(Figure("f", "f", "x", "y", [Band("spread", x, low, low + 1.0, "#0072b2")]))["traces"]
+    found = np.frombuffer(base64.b64decode(trace["x"]["bdata"]), dtype="<f4")
+    assert found == pytest.approx([0, 1, 1, 0, math.nan, 3, 4, 4, 3, math.nan], nan_ok=True)
+
+
+def test_the_replay_begins_and_ends_with_the_robot_in_the_picture(report: Report):
+    links = next(section.replay for section in report.sections if section.key == "replay")["links"]  # type: ignore[index]
+    assert np.isfinite(links[[0, -1]]).all()
+
+
+def test_pictures_that_were_not_compressed_are_shown_too(trial: Path, tmp_path: Path):
+    bag = Bag(tmp_path / "raw")
+    with Log(trial) as log:
+        for record in log.records():
+            if record.topic.name != "/camera/image_raw/compressed":
+                bag.copy_topic(record.topic)
+                bag.write(record.topic.name, record.data, record.log_time)
+                continue
+            message = log.decode(record)
+            picture = cv2.imdecode(np.frombuffer(bytes(message.data), np.uint8), cv2.IMREAD_COLOR)
+            raw = picture_to_message(np.asarray(picture, dtype=np.uint8), from_message(message.header.stamp))
+            bag.add_topic("/camera/image_raw", topics.CAMERA_IMAGE.type_name, topics.CAMERA_IMAGE.quality)
+            bag.write("/camera/image_raw", serialize_message(raw), record.log_time)
+    bag.close()
+    with Log(tmp_path / "raw") as log:
+        found = {section.key: section for section in make_report(log, "", lambda number: None).sections}
+    assert len(found["stills"].stills) >= 5 and all("not drawn" not in each.caption for each in found["stills"].stills)
+
+
+def test_ink_can_be_read_on_every_colour():
+    assert (ink_on("#0072b2"), ink_on("#e69f00"), ink_on("#56b4e9")) == ("#ffffff", "#1a222b", "#1a222b")
 
 
 def test_small_things():

@@ -137,6 +137,13 @@ def test_files_hold_the_table(recording: Path, tmp_path: Path, ending: str):
     assert phases == wanted["game_phase"].tolist()
 
 
+def test_all_names_are_legal_in_matlab_and_end_with_their_units():
+    for source in SOURCES:
+        for column in source.columns:
+            assert is_matlab_name(column.name), column.name
+            assert column.name.endswith(UNITS[column.unit]), column.name
+
+
 def test_of_two_robots_one_is_chosen(tmp_path: Path):
     path = write(tmp_path / "two", ("keeper", "striker"), end=200)
     with Log(path) as log:
@@ -172,7 +179,8 @@ def test_after_time_began_anew_the_longest_part_counts(tmp_path: Path):
         (("--to", "t.csv", "--rate", "1e9"), "expected at most"),
         (("--to", "t.csv", "--rate", "5", "--times-of", "odometry"), "expected one of them"),
         (("--to", "t.csv", "--times-of", "joint_state"), "Did you mean joint_states"),
-        (("--to", "no/such/folder/t.csv"), "cannot be written"),
+        (("--to", "no/such/folder/t.csv"), "There is no folder no/such/folder"),
+        (("--to", "/proc/t.csv"), "/proc/t.csv cannot be written"),
     ],
 )
 def test_bad_choices_are_told(

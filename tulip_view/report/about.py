@@ -33,6 +33,7 @@ def about(recording: Recording, left_out: list[LeftOut], size: int) -> Section:
         section.rows += [(f"{note}: {key}", value) for key, value in values.items()]
     if not recording.metadata:
         section.words.append("The recorder noted nothing about itself (versions, seed, parameters).")
+    section.words += recording.remarks
     section.words += [f"Left out: {each.title} ({each.why})." for each in left_out]
     return section
 

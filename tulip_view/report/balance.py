@@ -58,8 +58,10 @@ def balance(recording: Recording, robot: Robot) -> Section:
         "balance",
         TITLE,
         [
+            "CoM: centre of mass. ZMP: zero-moment point, where the ground's forces balance. DCM: divergent component "
+            "of motion, the CoM plus its speed times a time constant: where the robot tends to fall.",
             "In the sole frame of the foot that carries (in double support: that carried last): x towards the toes, "
-            "y to the left. The grey band is the support polygon: one sole, or the hull of both."
+            "y to the left. The grey band is the support polygon: one sole, or the hull of both.",
         ],
     )
     for axis, label in enumerate(("forward", "left")):
@@ -78,7 +80,7 @@ def balance(recording: Recording, robot: Robot) -> Section:
         if not alone.any():
             section.words.append(f"The {name} foot never carried alone.")
             continue
-        figure = Figure(f"foot{name}", f"On the {name} foot alone", "y [m], to the left", "x [m], towards the toes")
+        figure = Figure(f"foot{name}", f"On the {name} foot alone", "to the right [m]", "towards the toes [m]")
         figure.equal, figure.time, figure.half, figure.height = True, False, True, 460
         foot = robot.feet[side]
         corners = np.array([(foot.x[i], foot.y[j]) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))])
@@ -89,9 +91,7 @@ def balance(recording: Recording, robot: Robot) -> Section:
                 continue
             x, y = thin(points[alone, 0], points[alone, 1], most=POINTS)
             figure.items.append(Line(label, -y, x, colour, points=True, width=3))
-        figure.x_label = "to the right [m]"
-        figure.y_label = "towards the toes [m]"
-        figure.x_range, figure.y_range = (-0.22, 0.22), (-0.2, 0.25)
+        figure.x_range, figure.y_range = (-0.24, 0.24), (-0.22, 0.28)
         section.figures.append(figure)
     return section
 

@@ -120,7 +120,7 @@ def _add(
         figure.y_range = (-widest, widest)
         outside = np.abs(e) > s
         if outside.any():
-            figure.items.append(Line("outside", t, np.where(outside, e, np.nan), RED, points=True, width=3))
+            figure.items.append(Line("outside the band", t, np.where(outside, e, np.nan), RED, points=True, width=3))
     section.figures.append(figure)
 
 

@@ -32,6 +32,9 @@ SIGMAS = 2.0
 TURN = np.linspace(0.0, 2.0 * math.pi, 33)
 WHITE = "#ffffff"
 TURF = "#4a8f4a"
+PALE_TURF = "#a9c9a4"
+"""Of the diagram: dark lines can be told apart on it."""
+RING = 0.07  # [m] radius
 JUMP = 0.5  # [m] between two samples: somebody has set it down elsewhere, and no path leads there
 LARGEST_ELLIPSE = 3.0  # [m] of its half axis; more says no more than "anywhere", and covers the rest
 
@@ -48,7 +51,8 @@ def field_paths(recording: Recording, field: Field) -> Section:
     x, y = field.carpet_length / 2.0, field.carpet_width / 2.0
     figure = Figure("field", "Paths in the map", "x [m]", "y [m]", equal=True, time=False, height=760)
     figure.x_range, figure.y_range = (-x, x), (-y, y)
-    figure.items += ground_lines(field)
+    figure.items += ground_lines(field, PALE_TURF)
+    ends: list[Line] = []
     if truth is not None:
         poses = np.array([(m.robot.position.x, m.robot.position.y) for m in truth.messages])
         balls = np.array([(m.ball.position.x, m.ball.position.y) for m in truth.messages])
@@ -65,7 +69,8 @@ def field_paths(recording: Recording, field: Field) -> Section:
         for places, colour in ((poses, BLACK), (balls, ORANGE), (keepers, PURPLE)):
             known = places[np.isfinite(places).all(axis=1)]
             if len(known):  # where the path ends; of somebody who stands still it is all that there is
-                figure.items.append(Line("", known[-1:, 0], known[-1:, 1], colour, points=True, width=9))
+                ends.append(Line("", known[-1:, 0], known[-1:, 1], colour, points=True, width=10))
+                ends.append(Line("", *_ring(known[0]), colour, width=2.0))
     if world is not None:
         estimate = np.array([m.robot_pose[:2] for m in world.messages])
         figure.items.append(path("robot, estimate", estimate, BLUE, dashed=True))
@@ -76,13 +81,21 @@ def field_paths(recording: Recording, field: Field) -> Section:
             (sx, sy) = thin(seen[:, 0], seen[:, 1], most=600)
             figure.items.append(Line("opponent, estimate", sx, sy, SKY, points=True, width=3))
         figure.items += _ellipses(world.times, world.messages)
-    words = ["Dots: where the paths end."] if truth is not None else []
+    figure.items += ends
+    words = ["Rings: where the true paths begin. Dots: where they end."] if truth is not None else []
     if world is not None:
-        words.append(f"Ellipses: {SIGMAS:g} sigma of the estimates, every {ELLIPSE_PERIOD:g} s.")
+        words.append(
+            f"Ellipses: {SIGMAS:g} sigma of the estimates, every {ELLIPSE_PERIOD:g} s; those larger than "
+            f"{LARGEST_ELLIPSE:g} m are left out, and good estimates have some that are smaller than the lines."
+        )
     return Section("fieldpaths", TITLE, words, [figure])
 
 
-def ground_lines(field: Field) -> list[Line]:
+def _ring(centre: Array) -> tuple[Array, Array]:
+    return centre[0] + RING * np.cos(TURN), centre[1] + RING * np.sin(TURN)
+
+
+def ground_lines(field: Field, turf: str = TURF) -> list[Line]:
     """Return carpet, lines, circle, marks and goals."""
     x, y = field.carpet_length / 2.0, field.carpet_width / 2.0
     carpet = np.array([(-x, -y), (x, -y), (x, y), (-x, y), (-x, -y)])
@@ -105,9 +118,9 @@ def ground_lines(field: Field) -> list[Line]:
         goals_x += [goal.x, goal.back, goal.back, goal.x, math.nan]
         goals_y += [left.y, left.y, right.y, right.y, math.nan]
     return [
-        Line("", carpet[:, 0], carpet[:, 1], TURF, closed=True, width=0.5),
+        Line("", carpet[:, 0], carpet[:, 1], turf, closed=True, width=0.5),
         Line("", np.array(xs), np.array(ys), WHITE, width=2.0),
-        Line("", np.array(goals_x), np.array(goals_y), "#ffe14d", width=3.0),
+        Line("", np.array(goals_x), np.array(goals_y), "#e6c700", width=3.0),
     ]
 
 
@@ -116,7 +129,7 @@ def path(name: str, points: Array, colour: str, dashed: bool = False) -> Line:
     x, y = (values.copy() for values in thin(points[:, 0], points[:, 1], most=3000))
     jumps = np.flatnonzero(np.hypot(np.diff(x), np.diff(y)) > JUMP) + 1
     x[jumps], y[jumps] = np.nan, np.nan
-    return Line(name, x, y, colour, dashed=dashed, width=2.0)
+    return Line(name, x, y, colour, dashed=dashed, width=2.0 if dashed else 3.5)
 
 
 def ellipse(centre: Array, covariance: Array) -> Array | None:

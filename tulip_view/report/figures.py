@@ -18,6 +18,9 @@ BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY, BLACK = (
     "#0072b2", "#e69f00", "#009e73", "#d55e00", "#cc79a7", "#56b4e9", "#999999", "#222222",
 )  # fmt: skip
 
+SYMBOLS = {"diamond": "D", "circle": "o", "x": "X", "star": "*", "triangle-up": "^"}
+"""Of marks: plotly's names, and matplotlib's."""
+
 
 @dataclass(frozen=True)
 class Line:
@@ -70,12 +73,14 @@ class Span:
 
 @dataclass(frozen=True)
 class Mark:
-    """An instant in a lane of a timeline [s]."""
+    """An instant in a lane of a timeline [s]; `kind` and `symbol` (a key of SYMBOLS) are the same for all of a sort."""
 
     lane: str
     label: str
     time: float
     colour: str
+    kind: str
+    symbol: str
 
 
 @dataclass
@@ -126,8 +131,10 @@ class Section:
         key: Unique, letters only.
         title: Its heading.
         words: Paragraphs.
+        facts: The most important numbers, each with its name.
         figures: Diagrams.
         header, rows: A table; none without rows.
+        row_times: Of each row, if rows are events [s].
         stills: Camera pictures.
         replay: Data of the 3D replay; see `replay`.
     """
@@ -138,6 +145,8 @@ class Section:
     figures: list[Figure] = field(default_factory=list)
     header: tuple[str, ...] = ()
     rows: list[tuple[str, ...]] = field(default_factory=list)
+    row_times: list[float] = field(default_factory=list)
+    facts: list[tuple[str, str]] = field(default_factory=list)
     stills: list[Still] = field(default_factory=list)
     replay: dict[str, Any] | None = None
 
@@ -175,3 +184,9 @@ def spans_of(lane: str, times: Array, labels: list[str], end: float, colours: di
                 found.append(Span(lane, labels[begin], float(times[begin]), until, colours.get(labels[begin], GREY)))
             begin = index
     return found
+
+
+def ink_on(colour: str) -> str:
+    """Return black or white, whichever reads better on a colour like "#0072b2"."""
+    red, green, blue = (int(colour[place : place + 2], 16) / 255.0 for place in (1, 3, 5))
+    return "#ffffff" if 0.3 * red + 0.59 * green + 0.11 * blue < 0.5 else "#1a222b"

@@ -32,6 +32,10 @@ def joints(recording: Recording) -> Section:
     error = Figure("jointerror", "Angle: desired - measured", "time [s]", "error [deg]", choices=readable, height=200)
     torque = Figure("jointtorque", "Torque and its parts", "time [s]", "torque [N m]", choices=readable)
     section = Section("joints", TITLE, figures=[angle, error, torque])
+    if not parts[2].any():
+        section.words.append(
+            "The learned part of the torques is 0 throughout: learning was off, or had learned nothing."
+        )
     section.header = ("joint", "RMS tracking error", "greatest", "RMS torque (sum of parts)", "of it feedback")
     for index, name in enumerate(readable):
         off = np.degrees(desired[:, index] - measured[:, index])
@@ -39,7 +43,7 @@ def joints(recording: Recording) -> Section:
             track.times, np.degrees(desired[:, index]), np.degrees(measured[:, index]), off, most=MOST
         )
         angle.items += [
-            Line("desired", t, want, ORANGE, choice=name),
+            Line("desired", t, want, ORANGE, width=4.0, choice=name),  # broad: good tracking would hide it
             Line("measured", t, have, BLUE, choice=name),
         ]
         error.items.append(Line("desired - measured", t, lag, RED, choice=name))

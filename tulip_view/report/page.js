@@ -17,6 +17,10 @@ function drawFigure(key) {
   const figure = content.figures[key];
   const plot = document.getElementById("figure-" + key);
   if (figure.time && shownRange !== null) figure.layout.xaxis.range = shownRange;
+  if (figure.layout.yaxis.scaleanchor) {  // no empty space above and below on a narrow page
+    figure.layout.height = Math.min(figure.layout.height, 0.75 * plot.clientWidth + 140);
+    plot.style.height = figure.layout.height + "px";
+  }
   Plotly.newPlot(plot, figure.traces, figure.layout, settings);
   plot.dataset.drawn = "yes";
   if (!figure.time) return;
@@ -74,14 +78,14 @@ document.querySelectorAll("select.choice").forEach((chooser) => chooser.addEvent
   });
 }));
 
-document.querySelectorAll("figure[data-time]").forEach((still) =>
-  still.addEventListener("click", () => showTime(Number(still.dataset.time))));
+document.querySelectorAll("[data-time]").forEach((each) =>
+  each.addEventListener("click", () => showTime(Number(each.dataset.time))));
 
 // Replay --------------------------------------------------------------------------------------------------------------
 // links: frames x links x 7 (position, quaternion x, y, z, w); ball, ball_belief: frames x 3; other, belief:
 // frames x 3 (x, y, yaw); boxes: {link, size, centre, colour}. NaN where nothing is known.
 const replay = content.replay;
-const scene = document.getElementById("scene");
+const scene = document.getElementById("stage");
 const faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
   [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]];
 let player = null;

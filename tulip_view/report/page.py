@@ -9,13 +9,19 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from plotly.offline import get_plotlyjs
 
 from tulip_view.report.build import Report
-from tulip_view.report.figures import Band, Figure, Line, Mark, Section, Span
+from tulip_view.report.figures import Band, Figure, Line, Mark, Section, Span, ink_on
 
-LETTER = 0.0065  # of the timeline's width that one letter takes
-LEAST_LETTERS = 4  # fewer do not tell a name
+HELP = (
+    "One time runs through the page: the slider of the replay, a click into a diagram of time, on a picture or on an "
+    "event sets it; the vertical line shows it. Drag over a diagram to zoom, in time in all of them; a double click "
+    "shows all again; a click on a name in a legend hides its line."
+)
+LETTER = 0.0078  # of the timeline's width that one letter takes
+LEAST_LETTERS = 6  # fewer do not tell a name
 
 
 def make_page(report: Report) -> str:
@@ -31,7 +37,7 @@ def make_page(report: Report) -> str:
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>\n'
         f'<meta name="viewport" content="width=device-width">\n<style>\n{style}</style></head>\n<body>'
-        f"<header><h1>{title}</h1><nav>{links}</nav></header>\n<main>{body}</main>\n"
+        f"<header><h1>{title}</h1><nav>{links}</nav></header>\n<main><p>{HELP}</p>{body}</main>\n"
         f"<script>{get_plotlyjs()}</script>\n"
         f'<script id="content" type="application/json">{content}</script>\n<script>\n{script}</script></body></html>\n'
     )
@@ -43,15 +49,23 @@ def draw(figure: Figure) -> dict[str, Any]:
     for item in figure.items:
         if isinstance(item, Line):
             traces.append(_line(item, figure))
+            if item.points and item.name:  # points as small as those of the diagram could not be seen in the legend
+                traces.append(_sample(traces[-1]))
         elif isinstance(item, Band):
             traces += _band(item, figure)
     traces += _lanes(figure)
     layout: dict[str, Any] = {
         "height": figure.height,
-        "margin": {"l": 64, "r": 16, "t": 20, "b": 44},
+        "margin": {"l": 64, "r": 16, "t": 28, "b": 44},
         "xaxis": {"title": {"text": figure.x_label}, "zeroline": False, "gridcolor": "#e6e9ee"},
         "yaxis": {"title": {"text": figure.y_label}, "zeroline": False, "gridcolor": "#e6e9ee", "automargin": True},
-        "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0},
+        "legend": {
+            "orientation": "h",
+            "y": 1.0,
+            "yanchor": "bottom",
+            "x": 0.0,
+            "traceorder": "normal",
+        },
         "hovermode": "closest",
         "plot_bgcolor": "#ffffff",
         "paper_bgcolor": "#ffffff",
@@ -68,7 +82,8 @@ def draw(figure: Figure) -> dict[str, Any]:
         lanes = list(dict.fromkeys(item.lane for item in figure.items if isinstance(item, Span | Mark)))
         layout["yaxis"].update(type="category", categoryorder="array", categoryarray=lanes[::-1])
         layout["barmode"] = "overlay"
-        layout["showlegend"] = False
+        layout["uniformtext"] = {"mode": "hide", "minsize": 11}  # of a narrow page
+        layout["margin"]["l"] = 72
     return {"traces": traces, "layout": layout, "time": figure.time, "choices": list(figure.choices)}
 
 
@@ -92,11 +107,36 @@ def _line(line: Line, figure: Figure) -> dict[str, Any]:
     return _with_choice(trace, line.choice, figure)
 
 
+def _sample(points: dict[str, Any]) -> dict[str, Any]:
+    """Move the entry in the legend from points to a larger one that is nowhere in the diagram; return that."""
+    points.update(showlegend=False, legendgroup=points["name"])
+    return {**points, "x": [None], "y": [None], "showlegend": True, "marker": {**points["marker"], "size": 8}}
+
+
 def _band(band: Band, figure: Figure) -> list[dict[str, Any]]:
-    common = {"type": "scatter", "mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "x": packed(band.x)}
-    lower = {**common, "y": packed(band.low), "showlegend": False}
-    upper = {**common, "y": packed(band.high), "name": band.name, "fill": "tonexty", "fillcolor": band.colour + "44"}
-    return [_with_choice(lower, band.choice, figure), _with_choice(upper, band.choice, figure)]
+    """Return one outline for each piece without gaps: plotly would fill the space between pieces, too."""
+    known = np.isfinite(band.x) & np.isfinite(band.low) & np.isfinite(band.high)
+    gap = np.array([np.nan])
+    x: list[NDArray[Any]] = []
+    y: list[NDArray[Any]] = []
+    for piece in np.split(np.arange(len(known)), np.flatnonzero(np.diff(known)) + 1):
+        if len(piece) and known[piece[0]]:
+            x += [band.x[piece], band.x[piece][::-1], gap]
+            y += [band.low[piece], band.high[piece][::-1], gap]
+    if not x:
+        return []
+    trace = {
+        "type": "scatter",
+        "mode": "lines",
+        "line": {"width": 0},
+        "hoverinfo": "skip",
+        "name": band.name,
+        "fill": "toself",
+        "fillcolor": band.colour + "44",
+        "x": packed(np.concatenate(x)),
+        "y": packed(np.concatenate(y)),
+    }
+    return [_with_choice(trace, band.choice, figure)]
 
 
 def _lanes(figure: Figure) -> list[dict[str, Any]]:
@@ -117,27 +157,30 @@ def _lanes(figure: Figure) -> list[dict[str, Any]]:
                 "textposition": "inside",
                 "insidetextanchor": "middle",
                 "textangle": 0,
-                "constraintext": "none",
-                "textfont": {"color": "#ffffff", "size": 11},
+                "textfont": {"color": [ink_on(span.colour) for span in spans], "size": 11},
+                "showlegend": False,
                 "customdata": [f"{s.label}<br>{s.begin:.2f} s to {s.end:.2f} s" for s in spans],
                 "hovertemplate": "%{customdata}<extra></extra>",
                 "width": 0.7,
             }
         )
-    if marks:
+    for kind in dict.fromkeys(mark.kind for mark in marks):
+        same = [mark for mark in marks if mark.kind == kind]
         traces.append(
             {
                 "type": "scatter",
                 "mode": "markers",
-                "x": [mark.time for mark in marks],
-                "y": [mark.lane for mark in marks],
+                "name": kind,
+                "showlegend": True,
+                "x": [mark.time for mark in same],
+                "y": [mark.lane for mark in same],
                 "marker": {
-                    "color": [mark.colour for mark in marks],
+                    "color": same[0].colour,
                     "size": 11,
-                    "symbol": "diamond",
+                    "symbol": same[0].symbol,
                     "line": {"width": 1, "color": "#ffffff"},
                 },
-                "customdata": [f"{mark.label}<br>{mark.time:.2f} s" for mark in marks],
+                "customdata": [f"{html.escape(mark.label)}<br>{mark.time:.2f} s" for mark in same],
                 "hovertemplate": "%{customdata}<extra></extra>",
             }
         )
@@ -182,9 +225,13 @@ def _packed(replay: dict[str, Any] | None) -> dict[str, Any] | None:
 def _section(section: Section) -> str:
     parts = [f'<section id="{section.key}"><h2>{html.escape(section.title)}</h2>']
     parts += [f"<p>{html.escape(words)}</p>" for words in section.words]
+    if section.facts:
+        pairs = (f"<div><dt>{html.escape(name)}</dt><dd>{html.escape(fact)}</dd></div>" for name, fact in section.facts)
+        parts.append(f"<dl>{''.join(pairs)}</dl>")
     if section.replay is not None:
         parts.append(
-            '<div id="scene"></div><div class="controls"><button id="play">Play</button>'
+            "<p>Turn with the mouse, move with the right button, zoom with the wheel.</p>"
+            '<div id="stage"></div><div class="controls"><button id="play">Play</button>'
             '<input id="slider" type="range" min="0" value="0" step="1" aria-label="time">'
             '<output id="now"></output><select id="speed" aria-label="speed"><option value="0.25">0.25 x</option>'
             '<option value="0.5">0.5 x</option><option value="1" selected>1 x</option><option value="2">2 x</option>'
@@ -207,8 +254,10 @@ def _section(section: Section) -> str:
     parts.append("</div>")
     if section.rows:
         head = "".join(f"<th>{html.escape(cell)}</th>" for cell in section.header)
+        times = [f' data-time="{time:.4f}"' for time in section.row_times] or [""] * len(section.rows)
         rows = "".join(
-            "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in section.rows
+            f"<tr{time}>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>"
+            for time, row in zip(times, section.rows, strict=True)
         )
         parts.append(f'<div class="table"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>')
     if section.stills:

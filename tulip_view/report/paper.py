@@ -6,26 +6,33 @@ import math
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import cv2
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure as Canvas
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from tulip_view.report.build import Report
-from tulip_view.report.figures import Band, Figure, Line, Mark, Section, Span
+from tulip_view.report.figures import SYMBOLS, Band, Figure, Line, Mark, Section, Span, ink_on
 
 PAGE = (11.69, 8.27)  # [in] A4 across
 DPI = 110
 ROWS = 34  # lines of a table on one page
 WRAP = 150  # letters of a line of words
+HEADING = 0.95  # of the page's height, below the title
+LINE = 0.02  # of the page's height, that a line of words takes
 THIN = 0.6  # lines on paper are thinner than on a screen
 FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 SNAPSHOTS = 6
+LETTER = 0.0062  # of the timeline's width that one letter takes
 Named = tuple[str, Canvas]
 
 
@@ -46,35 +53,47 @@ def write_pngs(report: Report, folder: Path) -> list[Path]:
     Raises:
         OSError: if one cannot be written.
     """
-    written = []
-    for name, canvas in canvases(report):
-        FigureCanvasAgg(canvas)
-        written.append(folder / f"{name}.png")
-        canvas.savefig(written[-1], dpi=DPI)
-    return written
+    with TemporaryDirectory(dir=folder, prefix=".part") as part:  # all or none come to stay
+        for name, canvas in canvases(report):
+            FigureCanvasAgg(canvas)
+            canvas.savefig(Path(part) / f"{name}.png", dpi=DPI)
+        return [path.replace(folder / path.name) for path in sorted(Path(part).iterdir())]
 
 
 def canvases(report: Report) -> Iterator[Named]:
     """Yield the pages with their names, one after the other: a page of many points takes much memory."""
     for number, section in enumerate(report.sections, 1):
-        prefix = f"{number}_{section.key}"
+        prefix = f"{number:02}_{section.key}"
         title = f"{report.title}: {section.title}"
-        waiting: list[Figure] = []
-        for figure in section.figures:
-            if figure.choices:
-                yield f"{prefix}_{figure.key}", _all_choices(figure, title)
-            elif figure.equal and not figure.half:
-                yield f"{prefix}_{figure.key}", _page([figure], title, 1)
-            else:
-                waiting.append(figure)
-        for group, columns in _groups(waiting):
-            yield f"{prefix}_{group[0].key}", _page(group, title, columns)
-        if section.replay is not None:
-            yield f"{prefix}_snapshots", _snapshots(section.replay, title)
-        if section.stills:
-            yield f"{prefix}_pictures", _stills(section, title)
-        for page, canvas in enumerate(_table(section, title), 1):
-            yield f"{prefix}_table{page}", canvas
+        lines = [line for paragraph in section.words for line in textwrap.wrap(paragraph, WRAP)]
+        lines += ["; ".join(f"{name}: {fact}" for name, fact in section.facts)] if section.facts else []
+        for name, canvas in _of_section(section, prefix, title):
+            _caption(canvas, lines)
+            lines = []  # on the first page alone
+            yield name, canvas
+        if lines:
+            _caption(canvas := _canvas(title), lines)
+            yield f"{prefix}_words", canvas
+
+
+def _of_section(section: Section, prefix: str, title: str) -> Iterator[Named]:
+    """Yield the pages of one section."""
+    waiting: list[Figure] = []
+    for figure in section.figures:
+        if figure.choices:
+            yield f"{prefix}_{figure.key}", _all_choices(figure, title)
+        elif figure.equal and not figure.half:
+            yield f"{prefix}_{figure.key}", _page([figure], title, 1)
+        else:
+            waiting.append(figure)
+    for group, columns in _groups(waiting):
+        yield f"{prefix}_{group[0].key}", _page(group, title, columns)
+    if section.replay is not None:
+        yield f"{prefix}_snapshots", _snapshots(section.replay, title)
+    if section.stills:
+        yield f"{prefix}_pictures", _stills(section, title)
+    for page, canvas in enumerate(_table(section, title), 1):
+        yield f"{prefix}_table{page}", canvas
 
 
 def _groups(figures: list[Figure]) -> Iterator[tuple[list[Figure], int]]:
@@ -88,9 +107,17 @@ def _groups(figures: list[Figure]) -> Iterator[tuple[list[Figure], int]]:
 
 
 def _canvas(title: str) -> Canvas:
-    canvas = Canvas(figsize=PAGE, layout="constrained")
-    canvas.suptitle(title, fontsize=12, fontweight="bold", x=0.01, ha="left")
+    canvas = Canvas(figsize=PAGE, layout=ConstrainedLayoutEngine(rect=(0.0, 0.0, 1.0, HEADING)))
+    canvas.text(0.01, 0.985, title, fontsize=12, fontweight="bold", va="top")
     return canvas
+
+
+def _caption(canvas: Canvas, lines: list[str]) -> None:
+    """Write lines below a page's title, and move what it shows down."""
+    for number, line in enumerate(lines):
+        canvas.text(0.01, HEADING - LINE * number, line, fontsize=8, va="top")
+    room = HEADING - LINE * len(lines) - (0.01 if lines else 0.0)
+    canvas.set_layout_engine(ConstrainedLayoutEngine(rect=(0.0, 0.0, 1.0, room)))
 
 
 def _page(figures: list[Figure], title: str, columns: int) -> Canvas:
@@ -162,14 +189,24 @@ def _draw_lanes(axes: Axes, figure: Figure) -> None:
     if not timed:
         return
     lanes = list(dict.fromkeys(item.lane for item in timed))[::-1]
-    handles: dict[str, Patch] = {}
+    handles: dict[str, Artist] = {}
+    spans = [item for item in timed if isinstance(item, Span)]
+    whole = max((span.end for span in spans), default=0.0) - min((span.begin for span in spans), default=0.0)
     for item in timed:
         height = lanes.index(item.lane)
         if isinstance(item, Span):
             axes.broken_barh([(item.begin, item.end - item.begin)], (height - 0.35, 0.7), facecolor=item.colour)
-            handles.setdefault(item.label, Patch(color=item.colour, label=item.label))
+            label = f"{item.lane}: {item.label}"
+            handles.setdefault(label, Patch(color=item.colour, label=label))
+            middle, share = (item.begin + item.end) / 2.0, (item.end - item.begin) / max(whole, 1e-9)
+            if len(item.label) * LETTER < share:
+                axes.text(middle, height, item.label, fontsize=7, ha="center", va="center", color=ink_on(item.colour))
         else:
-            axes.plot(item.time, height, "D", color=item.colour, ms=6, mec="white", mew=0.7)
+            axes.plot(item.time, height, SYMBOLS[item.symbol], color=item.colour, ms=6, mec="white", mew=0.7)
+            handles.setdefault(
+                item.kind,
+                Line2D([], [], marker=SYMBOLS[item.symbol], color=item.colour, ls="", ms=6, label=item.kind),
+            )
     axes.set_yticks(range(len(lanes)), lanes)
     axes.legend(
         handles=list(handles.values()),
@@ -230,31 +267,20 @@ def _boxes(axes: Any, replay: dict[str, Any], frame: int) -> None:
 
 
 def _table(section: Section, title: str) -> Iterator[Canvas]:
-    words = [line for paragraph in section.words for line in textwrap.wrap(paragraph, WRAP)]
-    if not section.rows and not words:
-        return
-    pages = [section.rows[begin : begin + ROWS] for begin in range(0, len(section.rows), ROWS)] or [[]]
-    for number, rows in enumerate(pages):
+    for begin in range(0, len(section.rows), ROWS):
+        rows = section.rows[begin : begin + ROWS]
         canvas = _canvas(title)
         axes = canvas.subplots()
         axes.set_axis_off()
-        top = 1.0
-        if number == 0:
-            for line in words:
-                axes.text(0.0, top, line, fontsize=8, va="top", transform=axes.transAxes)
-                top -= 0.026
-        if not rows:
-            yield canvas
-            continue
         widths = _widths(section.header, rows)
         shown = [section.header, *rows]
         left = np.concatenate([[0.0], np.cumsum(widths)[:-1]])
-        step = min(0.027, (top - 0.02) / (len(shown) + 1))
+        step = min(0.027, 0.98 / (len(shown) + 1))
         for line_number, row in enumerate(shown):
             for x, width, cell in zip(left, widths, row, strict=True):
                 text = textwrap.shorten(cell, max(int(width * WRAP * 1.12), 8), placeholder=" ...")
                 weight = "bold" if line_number == 0 else "normal"
-                y = top - 0.02 - step * line_number
+                y = 0.98 - step * line_number
                 axes.text(x, y, text, fontsize=7.5, va="top", fontweight=weight, transform=axes.transAxes)
         yield canvas
 

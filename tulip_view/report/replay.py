@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tulip_description.field import Field
 from tulip_description.keeper import keeper_parts
 from tulip_description.model import floating_model
-from tulip_description.robot import Robot
+from tulip_description.robot import LEG_JOINTS, Robot
 from tulip_ros import topics
 from tulip_view.columns import ANGLE, LAST, LINEAR, Alignment
 from tulip_view.recording import Recording, Track
@@ -35,8 +35,9 @@ def replay(recording: Recording, robot: Robot, field: Field) -> Section:
     """
     joints, odometry = recording.get(topics.JOINT_STATES), recording.get(topics.ODOMETRY)
     truth, world = recording.get(topics.GROUND_TRUTH), recording.get(topics.WORLD_STATE)
-    if joints is None:
-        raise LeftOut(TITLE, "joint_states is not recorded")
+    motion = recording.get(topics.MOTION_STATE)
+    if joints is None and motion is None:
+        raise LeftOut(TITLE, "neither joint_states nor motion_state is recorded")
     if truth is None and (world is None or odometry is None):
         raise LeftOut(TITLE, "neither ground_truth nor world_state with odometry is recorded")
     rate = min(RATE, MOST_FRAMES / max(recording.end - recording.begin, 1e-9))
@@ -48,7 +49,12 @@ def replay(recording: Recording, robot: Robot, field: Field) -> Section:
         assert world is not None and odometry is not None
         base = _believed(world, odometry, times)
         words = "Where the robot is comes from its own estimate: the recording holds no truth."
-    angles = _angles(joints, robot, times)
+    if joints is not None:
+        angles = _angles(joints, list(joints.messages[0].name), joints.gather("position"), robot, times)
+    else:
+        assert motion is not None
+        angles = _angles(motion, list(LEG_JOINTS), motion.gather("joint_positions"), robot, times)
+        words += " Its head looks straight ahead: the angles of the neck are not recorded."
     data: dict[str, Any] = {"times": times.astype(np.float32), "rate": rate}
     names = [link.name for link in robot.links if link.boxes]
     data["links"] = _link_poses(robot, names, base, angles)  # (frames, links, 7)
@@ -76,7 +82,8 @@ def replay(recording: Recording, robot: Robot, field: Field) -> Section:
         ]
         data["other"] = _columns(truth, others, times, (LINEAR, LINEAR, ANGLE))
         data["other_boxes"] = [
-            {"size": part.size, "centre": part.centre, "colour": COLOURS[part.colour]} for part in keeper_parts()
+            {"size": part.size, "centre": part.centre, "colour": COLOURS[part.colour]}
+            for part in keeper_parts("magenta")  # the own robot is drawn with cyan marks
         ]
     if world is not None:
         poses = [tuple(m.robot_pose) for m in world.messages]
@@ -85,7 +92,13 @@ def replay(recording: Recording, robot: Robot, field: Field) -> Section:
             (*m.ball.position_in_map, field.ball_radius) if m.ball_known else (math.nan,) * 3 for m in world.messages
         ]
         data["ball_belief"] = _columns(world, balls, times, (LAST, LAST, LAST))
-    note = f"{words} {rate:.0f} frames a second. Turn with the mouse, move with the right button, zoom with the wheel."
+    known = np.flatnonzero(np.isfinite(data["links"]).all(axis=(1, 2)))
+    if not len(known):
+        raise LeftOut(TITLE, "the robot's place and its joints are never known at the same time")
+    shown = slice(known[0], known[-1] + 1)  # it begins and ends with the robot in the picture
+    for name in ("times", "links", "ball", "other", "belief", "ball_belief"):
+        data[name] = data[name][shown]
+    note = f"{words} {rate:.0f} frames a second."
     return Section("replay", TITLE, [note], replay=data)
 
 
@@ -138,14 +151,12 @@ def _believed(world: Track, odometry: Track, times: Array) -> Array:
     return base
 
 
-def _angles(joints: Track, robot: Robot, times: Array) -> Array:
+def _angles(track: Track, names: list[str], rows: Array, robot: Robot, times: Array) -> Array:
     """Return (n, 14) joint angles; 0 for joints that the recording does not tell."""
-    names = list(joints.messages[0].name)
-    rows = np.array([message.position for message in joints.messages])
     angles = np.zeros((len(times), len(robot.joint_names)))
     for column, name in enumerate(robot.joint_names):
         if name in names:
-            angles[:, column] = align(joints, rows[:, names.index(name)], LINEAR, times)
+            angles[:, column] = align(track, rows[:, names.index(name)], LINEAR, times)
     return angles
 
 

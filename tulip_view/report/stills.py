@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from tulip_description.camera_mount import load_mount
 from tulip_description.camera_pose import camera_in_footprint
@@ -19,31 +21,43 @@ from tulip_view.tables import align
 from tulip_vision.annotation import annotate
 from tulip_vision.lens import Lens, head_camera_lens
 from tulip_vision.lines import Lines
-from tulip_vision.messages import lens_from_message
+from tulip_vision.messages import lens_from_message, picture_from_message
 from tulip_vision.view import SpreadParameters, View
 from tulip_worldmodel.messages import features_from_message
 
 TITLE = "What the camera saw"
-NUMBER = 9
+NUMBER = 8
 QUALITY = 78  # of the JPEG
 NEAR = 0.001  # [s] features of a picture carry its stamp; decimals may differ
 
 
-def stills(recording: Recording, robot: Robot) -> Section:
+def pictures_of(recording: Recording) -> tuple[topics.Topic, Track] | None:
+    """Return the topic of pictures that the recording has, and their times: compressed ones, or as they are."""
+    found = ((topic, recording.get(topic)) for topic in (topics.CAMERA_COMPRESSED, topics.CAMERA_IMAGE))
+    return next(((topic, track) for topic, track in found if track is not None), None)
+
+
+def stills(recording: Recording, robot: Robot, picture_at: Callable[[topics.Topic, int], Any]) -> Section:
     """Return the section: some pictures, evenly spread over the time, those with a ball or much else preferred.
 
+    Args:
+        recording: What was read.
+        robot: Carries the camera.
+        picture_at: Reads one picture's message.
+
     Raises:
-        LeftOut: if the recording holds no compressed pictures, or no features of them.
+        LeftOut: if the recording holds no pictures, or no features of them.
     """
-    pictures, features = recording.get(topics.CAMERA_COMPRESSED), recording.get(topics.FEATURES)
-    if pictures is None or features is None:
-        raise LeftOut(TITLE, f"{'camera/image_raw/compressed' if pictures is None else 'features'} is not recorded")
+    camera, features = pictures_of(recording), recording.get(topics.FEATURES)
+    if camera is None or features is None:
+        raise LeftOut(TITLE, f"{topics.CAMERA_COMPRESSED.name if camera is None else 'features'} is not recorded")
+    topic, pictures = camera
     lens, words = _lens(recording)
     mount = load_mount()
     section = Section("stills", TITLE, [words])
     for index, found in _choose(pictures, features):
         time = float(pictures.times[index])
-        picture = cv2.imdecode(np.frombuffer(bytes(pictures.messages[index].data), np.uint8), cv2.IMREAD_COLOR)
+        picture = _decoded(picture_at(topic, index))
         if picture is None:
             section.words.append(f"The picture of {time:.3f} s cannot be decoded.")
             continue
@@ -53,10 +67,10 @@ def stills(recording: Recording, robot: Robot) -> Section:
             seen += " (not drawn: attitude or lens of this picture is not known)"
         else:
             height, orientation, pan, tilt = pose
-            camera = camera_in_footprint(robot, height, orientation, pan, tilt, mount)
-            view = View(lens, camera, SpreadParameters())
+            place = camera_in_footprint(robot, height, orientation, pan, tilt, mount)
+            view = View(lens, place, SpreadParameters())
             core = features_from_message(features.messages[found])
-            picture = annotate(picture.astype(np.uint8), core, view, np.empty((0, 2)), Lines((), None), ())
+            picture = annotate(picture, core, view, np.empty((0, 2)), Lines((), None), ())
         encoded, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         if encoded:
             section.stills.append(Still(data.tobytes(), f"{time:.2f} s: {seen or 'nothing'}", time))
@@ -69,12 +83,26 @@ def _lens(recording: Recording) -> tuple[Lens, str]:
     track = recording.get(topics.CAMERA_INFO)
     if track is not None:
         try:
-            return lens_from_message(track.messages[-1]), "Features of the same stamp are drawn in."
+            return lens_from_message(
+                track.messages[-1]
+            ), "Features of the same stamp are drawn in, with what vision thinks of their certainty (0 to 1)."
         except ValueError:
             pass
     return head_camera_lens(), (
         "Features of the same stamp are drawn in, through the lens as calibrated here: the recording has none."
     )
+
+
+def _decoded(message: Any) -> NDArray[np.uint8] | None:
+    """Return (height, width, 3) BGR, or None for a picture that cannot be decoded."""
+    if isinstance(message, topics.CAMERA_IMAGE.message):
+        try:
+            return picture_from_message(message)
+        except ValueError:
+            return None
+    data = np.frombuffer(bytes(message.data), np.uint8)
+    picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
+    return None if picture is None else picture.astype(np.uint8)
 
 
 def _choose(pictures: Track, features: Track) -> list[tuple[int, int]]:

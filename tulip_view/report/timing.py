@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from tulip_ros import topics
+from tulip_ros.log_notes import LOST
 from tulip_ros.time import from_message
 from tulip_view.recording import Recording, Track
 from tulip_view.report.figures import BLUE, GREEN, ORANGE, Array, Figure, LeftOut, Line, Section, thin
+from tulip_view.report.stills import pictures_of
 
 TITLE = "Time"
 WINDOW = 1.0  # [s] of the recorder's clock, over which the real-time factor is a mean
@@ -16,10 +18,12 @@ PERIODIC = (
     topics.LEG_COMMAND,
     topics.MOTION_STATE,
     topics.CAMERA_COMPRESSED,
+    topics.CAMERA_IMAGE,
     topics.FEATURES,
     topics.WORLD_STATE,
 )
 """Topics whose stamps come at a steady pace, so that a gap means that something is missing."""
+LEAST = 0.01  # [ms]
 GAP = 1.6  # of the usual period: longer ones count as gaps
 
 
@@ -32,6 +36,7 @@ def timing(recording: Recording) -> Section:
     section = Section("timing", TITLE)
     _real_time(recording, section)
     _latencies(recording, section)
+    _lost(recording, section)
     section.header = ("topic", "messages", "usual period", "gaps", "missing", "longest gap")
     for topic in PERIODIC:
         track = recording.get(topic)
@@ -88,7 +93,7 @@ def _real_time(recording: Recording, section: Section) -> None:
 
 
 def _latencies(recording: Recording, section: Section) -> None:
-    pictures = recording.get(topics.CAMERA_COMPRESSED)
+    camera = pictures_of(recording)
     features, world = recording.get(topics.FEATURES), recording.get(topics.WORLD_STATE)
     figure = Figure("latency", "From a picture's stamp to ...", "time [s]", "latency [ms]", height=240)
     for name, found, colour in (
@@ -99,8 +104,9 @@ def _latencies(recording: Recording, section: Section) -> None:
             continue
         stamps, wall = found
         latency = 1e3 * (wall - _said(recording, stamps))
-        if not latency.any():
-            continue  # lockstep tells it at its own stamp
+        stamps, latency = stamps[np.isfinite(latency)], latency[np.isfinite(latency)]
+        if not _tells(latency):
+            continue
         x, y = thin(stamps, latency)
         figure.items.append(Line(name, x, y, colour))
         section.words.append(
@@ -108,8 +114,9 @@ def _latencies(recording: Recording, section: Section) -> None:
             f"longest {latency.max():.1f} ms."
         )
     commands = recording.get(topics.LEG_COMMAND)
-    latency = np.zeros(0) if commands is None else 1e3 * (commands.wall - _said(recording, commands.times))
-    if commands is not None and latency.any():
+    if commands is not None and _tells(latency := 1e3 * (commands.wall - _said(recording, commands.times))):
+        known = np.isfinite(latency)
+        latency = latency[known]
         section.words.append(
             f"Joint state to leg command: median {np.median(latency):.1f} ms, 95 % below "
             f"{np.percentile(latency, 95):.1f} ms."
@@ -117,16 +124,19 @@ def _latencies(recording: Recording, section: Section) -> None:
         control = Figure(
             "control", "From a joint state's stamp to the leg command", "time [s]", "latency [ms]", height=210
         )
-        x, y = thin(commands.times, latency)
+        x, y = thin(commands.times[known], latency)
         control.items.append(Line("leg command", x, y, GREEN))
         section.figures.append(control)
     if figure.items:
         section.figures.append(figure)
         section.words.append(
-            "Latencies are by the recorder's clock, from when it heard the joint states of a stamp; where it hears "
-            "messages out of their order, one may come out below 0."
+            "Log times are stamps here, so these are the latencies that the lockstep imitates."
+            if recording.log_time_is_stamp
+            else "Latencies are by the recorder's clock, from when it heard the joint states of a stamp; where it "
+            "hears messages out of their order, one may come out below 0."
         )
-    if pictures is not None and features is not None:
+    if camera is not None and features is not None:
+        pictures = camera[1]
         lost = len(np.setdiff1d(_nanoseconds(pictures.times), _nanoseconds(features.times)))
         section.words.append(f"Pictures without features: {lost} of {len(pictures)}.")
     if features is not None and world is not None:
@@ -135,14 +145,34 @@ def _latencies(recording: Recording, section: Section) -> None:
         section.words.append(f"Features that no recorded world state names as its newest: {lost} of {len(features)}.")
 
 
+def _lost(recording: Recording, section: Section) -> None:
+    """Tell what the recorder itself counted: messages that were sent and never reached it."""
+    counts = {name: int(count) for name, count in recording.metadata.get(LOST, {}).items() if count.isdigit()}
+    if not counts and recording.log_time_is_stamp:
+        return  # in lockstep nothing can get lost
+    if not counts:
+        section.words.append("The recorder noted no count of messages that were lost on their way to it.")
+    elif any(counts.values()):
+        lost = ", ".join(f"{count} of {name}" for name, count in counts.items() if count)
+        section.words.append(f"Lost on the way to the recorder, by its own count: {lost}.")
+    else:
+        section.words.append("Lost on the way to the recorder, by its own count: none.")
+
+
+def _tells(latency: Array) -> bool:
+    """Return whether latencies say anything: in lockstep most come out as the 0 that they are not."""
+    known = latency[np.isfinite(latency)]
+    return bool(len(known)) and float(np.abs(known).max()) > LEAST
+
+
 def _said(recording: Recording, stamps: Array) -> Array:
-    """Return when stamps were the present, by the recorder's clock [s].
+    """Return when stamps were the present, by the recorder's clock [s]; NaN where it does not tell.
 
     The joint states tell it best: no other topic is as frequent, and they are sent the moment they are measured.
     """
     joints = recording.get(topics.JOINT_STATES)
     track = joints if joints is not None else max(recording.tracks.values(), key=len)
-    said: Array = np.interp(stamps, track.times, track.wall)
+    said: Array = np.interp(stamps, track.times, track.wall, left=np.nan, right=np.nan)
     return said
 
 
