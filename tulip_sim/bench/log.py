@@ -1,4 +1,4 @@
-"""Recording: what it costs, how fast it is, how large, and what is left when the recorder is killed."""
+"""Recording: cost, speed, size, recomputing, and what is left when the recorder is killed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tulip_sim.bench import log_kill, log_match, log_throughput
+from tulip_sim.bench import log_kill, log_match, log_recompute, log_throughput
 from tulip_sim.bench.runner import Bench, Row
 
 SHARE, SIZE, LOSS = 0.10, 150.0, 1.0  # asked for: of a core; [MB] of 10 minutes; [s] lost at most
@@ -17,17 +17,19 @@ PARTS: dict[str, Callable[..., Row]] = {
     "match": log_match.measure,
     "throughput": log_throughput.measure,
     "kill": log_kill.measure,
+    "recompute": log_recompute.measure,
 }
 TRIALS = [
     ("match", 1, 1),
     ("match", 2, 1),
     ("throughput", "small messages"),
     ("throughput", "pictures"),
+    *(("recompute", *trial) for trial in log_recompute.TRIALS),
     *(("kill", number) for number in range(1, KILLS + 1)),
 ]
 
 
-def measure(part: str, *arguments: int | str) -> Row:
+def measure(part: str, *arguments: int | float | str) -> Row:
     """Run one trial of a part."""
     os.environ.setdefault("ROS_DOMAIN_ID", str(60 + os.getpid() % 40))  # no other graph on this machine is recorded
     return PARTS[part](*arguments)
@@ -36,7 +38,12 @@ def measure(part: str, *arguments: int | str) -> Row:
 def summarize(rows: list[Row]) -> list[str]:
     """Return a table for each part."""
     lines: list[str] = []
-    for part, tell in (("match", _matches), ("throughput", _throughput), ("kill", _kills)):
+    for part, tell in (
+        ("match", _matches),
+        ("throughput", _throughput),
+        ("recompute", log_recompute.lines),
+        ("kill", _kills),
+    ):
         of_part = [row for row in rows if row["part"] == part]
         if of_part:
             lines += ["", *tell(of_part)] if lines else tell(of_part)
