@@ -10,12 +10,16 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Iterator
+from struct import unpack_from
+
+import numpy as np
 
 from tulip_description.field import Field
 from tulip_description.planar import Pose2D
 from tulip_motion.interface import Odometry
 from tulip_motion.messages import odometry_from_message
 from tulip_ros import topics
+from tulip_ros.cdr import HEAD
 from tulip_sim.recompute.heard import OVERDUE, UNIX_TIME, Heard, Made, after_header, time_at
 from tulip_vision.features import Features
 from tulip_worldmodel.messages import (
@@ -30,6 +34,7 @@ from tulip_worldmodel.worldmodel_node import WorldModelNodeParameters
 
 ODOMETRY, FEATURES, START = topics.ODOMETRY.name, topics.FEATURES.name, topics.START_POSE.name
 STATE = topics.WORLD_STATE.name
+NUMBERS = 85  # of odometry: place 3, orientation 4, covariance 36, velocities 3 and 3, covariance 36
 
 
 class WorldModelStage:
@@ -70,7 +75,7 @@ class WorldModelStage:
                 self._start, self._model = pose, None
             return
         if heard.name == ODOMETRY:
-            odometry = odometry_from_message(heard.message)
+            odometry = odometry_of(heard)
             self._odometry.append(odometry)
             self._newest = odometry.stamp
         else:
@@ -142,6 +147,32 @@ class WorldModelStage:
             self._counts["begun in the middle of a run, where the world model knew more than a recording tells"] += 1
         self._model = WorldModel(self._parameters, self._field, start)
         return self._model
+
+
+def odometry_of(heard: Heard | Made) -> Odometry:
+    """Return recorded dead reckoning.
+
+    Most of what is to be decoded is odometry: a header, a name, and one block of numbers. To read it as such takes a
+    tenth of the time.
+    """
+    if isinstance(heard, Made) or heard.record.topic.type_name != topics.ODOMETRY.type_name:
+        return odometry_from_message(heard.message)
+    data = heard.record.data
+    order = "<" if data[1] & 1 else ">"
+    place = after_header(data)
+    (length,) = unpack_from(f"{order}I", data, place)
+    place += 4 + int(length)
+    values = np.frombuffer(data, f"{order}f8", NUMBERS, place + (HEAD - place) % 8).astype(np.float64)
+    return Odometry(
+        heard.stamp,
+        values[:3],
+        values[3:7],
+        values[43:46],
+        values[46:49],
+        0.0,
+        values[7:43].reshape(6, 6),
+        values[49:].reshape(6, 6),
+    )
 
 
 def picture_of(state: Heard) -> int:
