@@ -39,7 +39,7 @@ QUALITY = 50  # of the pictures, of which every second one is kept
 EVERY_TRUTH = 3  # of which one is kept: a moment is judged by the truth nearest to it, 30 ms away at most
 WORLD = ("odometry", "features", "world_state", "ground_truth", "initialpose")
 STRATEGY = ("motion_state", "game_state", "user_command", "decision", "behaviour_tree")
-EYES = ("joint_states", "camera/image_raw/compressed")
+EYES = ("joint_states", "camera/camera_info", "camera/image_raw/compressed")
 
 
 def trial(folder: Path, seconds: float, perception: PerceptionParameters | None) -> None:

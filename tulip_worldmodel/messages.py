@@ -18,7 +18,6 @@ from tulip_ros.time import header, stamp_of, to_message
 from tulip_vision.features import Feature, FeatureClass, Features
 from tulip_worldmodel.world_state import ObjectEstimate, WorldState
 
-
 PLANE = np.ix_((0, 1, 5), (0, 1, 5))
 """x, y and the rotation about z, among the six of a pose."""
 

@@ -79,6 +79,8 @@ def test_a_lockstep_run_without_pictures_comes_out_byte_by_byte(without_pictures
 
 
 def test_vision_on_pictures_without_losses_comes_out_byte_by_byte(with_pictures: Path) -> None:
+    with Log(with_pictures) as log:
+        assert log.topics["/camera/camera_info"].messages == 1
     outcome = outcome_of(with_pictures, "vision", "worldmodel", "strategy", "head")
     assert not outcome.lossy
     assert outcome.differences["/features"].recorded >= 14

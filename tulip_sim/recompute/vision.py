@@ -105,8 +105,11 @@ class VisionStage:
             self._poses.add_head(stamp_of(heard.message), *(float(angles[name]) for name in HEAD_JOINTS))
 
     def _process(self, now: int | None) -> Iterator[Made]:
-        """Answer the recorded features whose picture and pose are here, and those that waited too long at log time
-        `now` [ns]."""
+        """Answer the recorded features whose picture and pose are here.
+
+        Args:
+            now: Log time [ns], by which some may have waited too long; None at the end.
+        """
         while self._asked:
             asked = self._asked[0]
             while self._pictures and self._pictures[0].stamp < asked.stamp:
