@@ -28,6 +28,7 @@ KEPT = 100  # truths: 2 s, longer than features take
 RANGE = 4.0  # [m] up to which a ball in the picture is expected to be found
 NEAR = math.radians(5.0)  # [rad] of azimuth within which a ball counts as found
 JUDGED = 100_000_000  # [ns] between two states that are judged: estimates err for longer than that
+FRESH = 0.5  # [s] since the ball was seen, up to which its place counts: it may have been kicked since
 UPRIGHT = 0.5  # [rad] of the trunk's tilt up to which localization counts
 
 
@@ -38,7 +39,7 @@ class Judgement:
     Attributes:
         position: RMS of the robot's estimated position while it is upright [m].
         heading: The same of its heading [rad].
-        ball: Median error of the ball's estimated place, relative to the robot, while it is known [m].
+        ball: Median error of the ball's estimated place, relative to the robot, up to `FRESH` after it was seen [m].
         ball_recall: Share of the pictures that show the ball whole within `RANGE`, in which it was found.
         pictures_with_ball: How many pictures these are.
         latency: Median time from a picture to its features, by simulated log times [s].
@@ -186,7 +187,7 @@ def _judge_state(sums: Sequence[_Sums], state: Any, truth: Truth) -> None:
         if upright:
             each.position.append(math.hypot(state.robot_pose[0] - true.x, state.robot_pose[1] - true.y))
             each.heading.append(wrap_angle(float(state.robot_pose[2]) - true.yaw))
-        if state.ball_known:
+        if state.ball_known and state.ball.age <= FRESH:
             each.ball.append(math.hypot(state.ball.position[0] - here[0], state.ball.position[1] - here[1]))
 
 
