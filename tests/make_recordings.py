@@ -1,15 +1,19 @@
-"""Makes the recordings of tests/data/recordings anew: `python3 tests/make_recordings.py FOLDER`.
+"""Makes the recordings of tests/data/recordings anew, in place: `python3 tests/make_recordings.py`.
 
 Whole lockstep runs are recorded and then thinned out to what recomputing needs. Vision's features are those of the
-small JPEG pictures that are kept, computed when the recordings are made: a later run is compared with them.
+small JPEG pictures that are kept, computed when the recordings are made: a later run is compared with them. What the
+messages say depends on the code and the seed alone.
 """
 
 from __future__ import annotations
 
+import shutil
 import sys
 import tempfile
+import time
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -31,24 +35,28 @@ from tulip_sim.messages import jpeg_to_message
 from tulip_sim.perception import PerceptionParameters
 from tulip_sim.recompute.heard import time_at
 from tulip_sim.recompute.run import recompute
+from tulip_sim.referee import RefereeParameters
 from tulip_sim.robot_stack import RobotSettings
 from tulip_sim.scenario import make_scenario
 
+RECORDINGS = Path(__file__).parent / "data" / "recordings"
 SEED = 4
+SEED_WITH_PICTURES = 8  # the ball lies 1.5 m in front of the robot: the camera sees it from the beginning
+SOON = RefereeParameters(initial_time=0.5, ready_time=0.5, set_time=1.0)
+"""Of the recording with pictures: play begins soon, so that most of them show the ball."""
 QUALITY = 50  # of the pictures, of which every second one is kept
 EVERY_TRUTH = 3  # of which one is kept: a moment is judged by the truth nearest to it, 30 ms away at most
 WORLD = ("odometry", "features", "world_state", "ground_truth", "initialpose")
 STRATEGY = ("motion_state", "game_state", "user_command", "decision", "behaviour_tree")
-EYES = ("joint_states", "camera/image_raw/compressed")
+EYES = ("joint_states", "camera/camera_info", "camera/image_raw/compressed")
 
 
-def trial(folder: Path, seconds: float, perception: PerceptionParameters | None) -> None:
+def trial(folder: Path, seed: int, seconds: float, settings: Settings) -> None:
     """Record the beginning of a trial, all topics, with pictures that lose nothing."""
     recorder = LockstepRecording(folder, RecordedPictures("png", 0.0))
-    scenario = make_scenario("trial", np.random.default_rng(SEED), load_field())
-    settings = Settings(perception=perception)
-    run = Lockstep(scenario, SEED, settings, recorder.write)
-    explain_trial(recorder.notebook, SEED, "trial", scenario.robot, settings, run.user.strategy)
+    scenario = make_scenario("trial", np.random.default_rng(seed), load_field())
+    run = Lockstep(scenario, seed, settings, recorder.write)
+    explain_trial(recorder.notebook, seed, "trial", scenario.robot, settings, run.user.strategy)
     while run.stamp < seconds * 1e9:
         run.step()
     run.close()
@@ -111,11 +119,23 @@ def make(target: Path, whole: Callable[[Path], None], names: tuple[str, ...], co
 
 
 def main(target: Path) -> None:
-    """Make all of them in a folder."""
-    make(target / "walk", lambda folder: trial(folder, 20.0, PerceptionParameters()), WORLD + STRATEGY, ("worldmodel",))
-    make(target / "match", lambda folder: match(folder, 12.0), WORLD, ("worldmodel",))
-    make(target / "pictures", lambda folder: trial(folder, 8.0, None), WORLD + EYES, ("vision", "worldmodel"))
+    """Make all of them, and put them into a folder in place of the old ones."""
+    made_up = Settings(perception=PerceptionParameters())
+    seen = partial(trial, seed=SEED_WITH_PICTURES, seconds=8.0, settings=Settings(referee=SOON))
+    with tempfile.TemporaryDirectory() as temporary:
+        there = Path(temporary)
+        for name, whole, topics, components in (
+            ("walk", partial(trial, seed=SEED, seconds=20.0, settings=made_up), WORLD + STRATEGY, ("worldmodel",)),
+            ("match", partial(match, seconds=12.0), WORLD, ("worldmodel",)),
+            ("pictures", seen, WORLD + EYES, ("vision", "worldmodel")),
+        ):
+            begin = time.monotonic()
+            make(there / name, whole, topics, components)
+            size = sum(file.stat().st_size for file in (there / name).glob("*.mcap"))
+            print(f"{name}: {size / 1e6:.2f} MB in {time.monotonic() - begin:.0f} s", flush=True)
+            shutil.rmtree(target / name, ignore_errors=True)
+            shutil.copytree(there / name, target / name)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else RECORDINGS)

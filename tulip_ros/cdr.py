@@ -1,7 +1,8 @@
 """Serialized messages (CDR): equal but for the bytes that mean nothing.
 
-Numbers are aligned to their size, and the serializer leaves in the gaps whatever was in its buffer before. So two
-messages can only be compared byte by byte once these gaps are cleared.
+Numbers are aligned to their size, and the serializer leaves in the gaps, and behind the end, whatever was in its buffer
+before. The middleware fills up to a multiple of four bytes as well. So two messages can only be compared byte by byte
+once the gaps are cleared and the end is cut.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ Step = tuple[int, int, int, "tuple[Step, ...]"]
 
 
 def without_gaps(type_name: str, data: bytes) -> bytes:
-    """Return a serialized message with zeros in its gaps.
+    """Return a serialized message with zeros in its gaps, and without what fills it up behind its end.
 
     Args:
         type_name: As in "nav_msgs/msg/Odometry".
@@ -49,7 +50,7 @@ def without_gaps(type_name: str, data: bytes) -> bytes:
         raise ValueError(f"{len(data)} bytes are no {type_name}: {error}") from error
     if end + HEAD > len(data):
         raise ValueError(f"{len(data)} bytes are no {type_name}; expected at least {end + HEAD}")
-    return bytes(cleared)
+    return bytes(cleared[: end + HEAD])
 
 
 _LITTLE, _BIG = Struct("<I"), Struct(">I")

@@ -160,31 +160,34 @@ class RecorderNode(ComponentNode):
         self._latched: dict[str, tuple[_Input, bytes, int]] = {}  # last message of each latched topic, and when sent
         self._refused: set[str] = set()
         self._asker = ParameterAsker(self, self.learn)
-        self.create_service(topics.START_RECORDING.type, topics.START_RECORDING.name, self.on_start)
-        self.create_service(topics.STOP_RECORDING.type, topics.STOP_RECORDING.name, self.on_stop)
-        if self.settings.start:
-            self.begin(self.settings.path)
         # The topics of this project are subscribed before anyone publishes, so that no first message is lost.
         expected = [topic.within(robot) for robot in self.settings.robots for topic in topics.TOPICS]
         for topic in {topic.name: topic for topic in expected}.values():
             self.subscribe(
                 self.resolve_topic_name(topic.name), topic.type_name, topic.quality, ReliabilityPolicy.RELIABLE
             )
+        if self.settings.start:
+            self.begin(self.settings.path, from_now=False)
+        # Last, since who waits for a recorder waits for its services.
+        self.create_service(topics.STOP_RECORDING.type, topics.STOP_RECORDING.name, self.on_stop)
+        self.create_service(topics.START_RECORDING.type, topics.START_RECORDING.name, self.on_start)
         self.every(COLLECT, self.collect)
         self.every(LOOK, self.discover)
 
-    def begin(self, path: str) -> Path:
+    def begin(self, path: str, from_now: bool = True) -> Path:
         """Begin a recording and return its file.
 
         Args:
             path: Folder of the recording, or "" for a new one.
+            from_now: Leave out what came before and was not taken yet, but for what latched topics said last.
 
         Raises:
             BadInputError: if it cannot be written.
         """
         settings = self.settings
         folder = Path(path) if path else Path(settings.folder) / datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
-        self.take()  # what came before does not belong to it
+        if from_now:
+            self.take()
         split = Split(int(settings.split_size * 1e6), settings.split_time)
         bag = Bag(folder.absolute(), split, int(settings.free_space * 1e6), settings.compression)
         try:

@@ -27,7 +27,7 @@ from tulip_ros.errors import unknown
 from tulip_ros.log_notes import Notebook
 from tulip_ros.picture_rate import PICTURE_RATE, PictureRate
 from tulip_ros.topics import Topic
-from tulip_sim.messages import jpeg_to_message, png_to_message, report_to_message, truth_to_message
+from tulip_sim.messages import jpeg_to_message, lens_to_message, png_to_message, report_to_message, truth_to_message
 from tulip_strategy.messages import (
     decision_to_message,
     game_state_to_message,
@@ -89,6 +89,7 @@ class LockstepRecording:
             "sensors": lambda stamp, value: zip(
                 (topics.JOINT_STATES, topics.IMU, topics.FOOT_FORCES), sensors_to_messages(value, cells), strict=True
             ),
+            "camera/camera_info": lambda stamp, value: [(topics.CAMERA_INFO, lens_to_message(value, stamp))],
             "camera/image_raw": self._picture,
             "legs/joint_command": lambda stamp, value: [(topics.LEG_COMMAND, joint_command_to_message(value))],
             "head/joint_command": lambda stamp, value: [(topics.HEAD_JOINT_COMMAND, joint_command_to_message(value))],

@@ -36,6 +36,7 @@ from tulip_strategy.parameters import StrategyParameters
 from tulip_strategy.strategy import Strategy
 from tulip_strategy.tree_state import NodeStatus
 from tulip_vision.features import Features
+from tulip_vision.lens import head_camera_lens
 from tulip_vision.pipeline import VisionParameters
 from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParameters
 from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
@@ -120,6 +121,8 @@ class RobotStack:
         self.doing = ""
         """Active path of the behaviour tree."""
         self._tell("user_command", 0, self.user)
+        if settings.perception is None:
+            self._tell("camera/camera_info", 0, head_camera_lens())
         self.refused: list[str] = []
         """Reasons of joint commands and kicks that were refused."""
 

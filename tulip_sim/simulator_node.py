@@ -257,13 +257,19 @@ class SimulatorNode(ComponentNode, ABC):
             self._paced_from = (time.monotonic(), self.world.stamp)
 
     def _await_nodes(self, spin: Spin) -> None:
-        """Wait until the nodes of `wait_for` are in the graph, so that time begins with whole robots."""
+        """Wait until the nodes of `wait_for` are in the graph, so that time begins with whole robots.
+
+        A recorder is there once it serves: by then it has subscribed to everything.
+        """
         p, own = self._pace_settings, self.get_namespace().rstrip("/")
         begin = time.monotonic()
         missing = {f"{own}/{name}" for name in p.wait_for}
         while missing and time.monotonic() - begin < p.start_bound:
             spin(REPEAT)
-            missing -= {f"{space.rstrip('/')}/{name}" for name, space in self.get_node_names_and_namespaces()}
+            present = {f"{space.rstrip('/')}/{name}" for name, space in self.get_node_names_and_namespaces()}
+            if f"{own}/{topics.START_RECORDING.name}" not in dict(self.get_service_names_and_types()):
+                present.discard(f"{own}/recorder")
+            missing -= present
         if missing:
             names = ", ".join(sorted(name.removeprefix(f"{own}/") for name in missing))
             self.health.count("started without nodes", f"time begins without {names}")

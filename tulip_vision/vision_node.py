@@ -24,7 +24,9 @@ from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParamete
 
 WAITING = 3  # pictures that wait for their pose: 0.2 s at 15 Hz; then something is wrong with the poses
 
-JOINT_STATES_WAITING = 50  # 0.2 s at 250 Hz: none may be lost while a picture is processed
+JOINT_STATES_WAITING, ODOMETRY_WAITING = 250, 50
+"""1 s, as long as readings are kept: one that is lost while a picture is processed makes the next pose less exact, and
+a recording does not tell which were."""
 
 
 class VisionNode(ComponentNode):
@@ -35,22 +37,23 @@ class VisionNode(ComponentNode):
 
     def __init__(self) -> None:
         """Make the pose buffer and connect the topics; vision itself needs the lens and is made when it comes."""
-        super().__init__("vision")
         cv2.setNumThreads(1)  # the robot's other nodes need the other cores
-        self._settings = self.load(VisionParameters())
         self._robot = load_robot()
         self._own_body = OwnBody(self._robot)
+        # Before the node stands in the graph, where others wait for it: loops may have to be compiled.
+        Vision(VisionParameters(), head_camera_lens(), self._own_body).rehearse()
+        super().__init__("vision")
+        self._settings = self.load(VisionParameters())
         try:
             self._mount = load_mount()
         except MountFileError as error:
             raise BadInputError(str(error)) from None
         self._vision: Vision | None = None
-        Vision(self._settings, head_camera_lens(), self._own_body).rehearse()
         self.begin_anew()
         self._features = self.sender(topics.FEATURES)
         self._drawn = self.sender(topics.VISION_PICTURE)
         self.listen(topics.CAMERA_INFO, self._on_lens)
-        self.listen(topics.ODOMETRY, self._on_odometry)
+        self.listen(topics.ODOMETRY, self._on_odometry, depth=ODOMETRY_WAITING)
         self.listen(topics.JOINT_STATES, self._on_joints, depth=JOINT_STATES_WAITING)
         self.listen(topics.CAMERA_IMAGE, self._on_picture)
 

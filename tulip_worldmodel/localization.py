@@ -79,6 +79,7 @@ class Localization:
         self._seeds = SeedFinder(parameters, field)
         self._side = SideJudge(parameters, self._landmarks, self._seeds)
         self._scale = NoiseScale(p)
+        self._systematic = np.diag([p.systematic_spread**2] * 2 + [0.0])
         spreads = (p.start_position_spread, p.start_position_spread, p.start_heading_spread)
         self._hypotheses = [_Hypothesis(PoseFilter(p, self._camera, start, spreads), 0.0)]
         self._heading = start.yaw  # [rad] by dead reckoning, drawn slowly to what was believed while all was well
@@ -212,7 +213,7 @@ class Localization:
 
     def _stated(self, moments: list[tuple[Pose2D, Array]]) -> Array:
         """Return the (3, 3) covariance of a mixture, with what stays the same from picture to picture."""
-        return self._mixed(moments) + np.diag([self._parameters.systematic_spread**2] * 2 + [0.0])
+        return self._mixed(moments) + self._systematic
 
     def _mixed(self, moments: list[tuple[Pose2D, Array]]) -> Array:
         """Return the (3, 3) covariance of a mixture about its first pose: sum of w (P + d d^T)."""

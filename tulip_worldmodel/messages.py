@@ -18,6 +18,9 @@ from tulip_ros.time import header, stamp_of, to_message
 from tulip_vision.features import Feature, FeatureClass, Features
 from tulip_worldmodel.world_state import ObjectEstimate, WorldState
 
+PLANE = np.ix_((0, 1, 5), (0, 1, 5))
+"""x, y and the rotation about z, among the six of a pose."""
+
 
 def features_from_message(message: FeaturesMessage) -> Features:
     """Return the features of a message."""
@@ -79,8 +82,7 @@ def robot_pose_to_message(world: WorldState) -> PoseWithCovarianceStamped:
     message.pose.pose.position.y = world.robot.pose.y
     message.pose.pose.orientation = quaternion(world.robot.pose.yaw)
     covariance = np.zeros((6, 6))
-    plane = np.ix_((0, 1, 5), (0, 1, 5))  # x, y and the rotation about z
-    covariance[plane] = world.robot.covariance
+    covariance[PLANE] = world.robot.covariance
     message.pose.covariance = covariance.ravel()
     return message
 

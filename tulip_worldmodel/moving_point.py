@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from tulip_description.positive import check_positive
 from tulip_worldmodel.camera_error import CameraErrorParameters
-from tulip_worldmodel.mahalanobis import distances_and_determinants
+from tulip_worldmodel.mahalanobis import diagonal, distances_and_determinants
 from tulip_worldmodel.rolling import Slowing
 from tulip_worldmodel.sighting import Place, Sighting
 
 Array = NDArray[np.float64]
 
 STATES = 7
+UNITY = np.eye(2)
 SEEN = np.ix_((0, 1, 4, 5, 6), (0, 1, 4, 5, 6))  # what an angle depends on
 
 
@@ -119,7 +120,7 @@ class MovingPoint:
 
     def _moved(self, motion: PointMotion) -> tuple[Array, Array]:
         left, anew = self._camera.fading(motion.duration)
-        transition, noise = left * np.eye(STATES), np.diag([*np.zeros(4), *anew])
+        transition, noise = diagonal((left,) * STATES), diagonal((0.0, 0.0, 0.0, 0.0, *anew.tolist()))
         transition[:4, :4], offset, noise[:4, :4] = _transition(motion)
         state = transition @ self._filter.x
         state[:4] += offset
@@ -151,13 +152,13 @@ class MovingPoint:
 def _transition(motion: PointMotion) -> tuple[Array, Array, Array]:
     """Return the (4, 4) transition of the state, what is added to it (4,), and the (4, 4) covariance added."""
     duration, slowing, variance = motion.duration, motion.slowing, motion.velocity_variance
-    transition = np.eye(4)
-    transition[:2, 2:] = 0.5 * duration * (np.eye(2) + slowing.keep)
+    transition = diagonal((1.0, 1.0, 1.0, 1.0))
+    transition[:2, 2:] = 0.5 * duration * (UNITY + slowing.keep)
     transition[2:, 2:] = slowing.keep
     offset = np.concatenate((0.5 * duration * slowing.drop, slowing.drop))
     # Velocity as a random walk: its integral moves the position too.
     position, both = variance * duration**2 / 3.0, variance * duration / 2.0
-    noise = _kron(np.array([[position, both], [both, variance]]), np.eye(2))
+    noise = _kron(np.array([[position, both], [both, variance]]), UNITY)
     noise += _kron(np.array([[0.25 * duration**2, 0.5 * duration], [0.5 * duration, 1.0]]), slowing.noise)
     noise[:2, :2] += motion.position_noise
     return transition, offset, noise

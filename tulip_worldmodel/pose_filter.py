@@ -22,7 +22,7 @@ from tulip_worldmodel.landmark_association import Observation, associate
 from tulip_worldmodel.landmarks import CROSSINGS, ERROR, STATES
 from tulip_worldmodel.localization_parameters import LocalizationParameters
 from tulip_worldmodel.lost import LostDetector
-from tulip_worldmodel.mahalanobis import distances_and_determinants, gate
+from tulip_worldmodel.mahalanobis import diagonal, distances_and_determinants, gate
 from tulip_worldmodel.odometry_history import Increment
 
 Array = NDArray[np.float64]
@@ -167,7 +167,7 @@ class PoseFilter:
         turned = yaw + moved.pose.yaw + drift * moved.duration
         error = (roll * fade, pitch * fade, turn * fade)
         state = np.array([x + step_x, y + step_y, wrap_angle(turned), *error, drift * keep])
-        transition = np.diag([1.0, 1.0, 1.0, fade, fade, fade, keep])
+        transition = diagonal((1.0, 1.0, 1.0, fade, fade, fade, keep))
         transition[0, 2], transition[1, 2] = -step_y, step_x
         transition[2, 6] = moved.duration
         position = (
@@ -184,7 +184,7 @@ class PoseFilter:
             position += p.lost_position_noise**2 * moved.duration
             heading += p.lost_heading_noise**2 * moved.duration
         wander = p.drift_spread**2 * (1.0 - keep**2)
-        noise = np.diag([position, position, heading, *(scale**2 * anew), wander])
+        noise = diagonal((position, position, heading, *(scale**2 * anew).tolist(), wander))
         if moved.slip is not None:
             to_map = np.array([[c, -s], [s, c]])
             noise[:2, :2] += to_map @ moved.slip @ to_map.T

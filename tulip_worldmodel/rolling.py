@@ -23,6 +23,7 @@ DECELERATION = 0.35  # [m/s^2] of a ball on carpet; let one roll 2 m and stop th
 ROLLING_SHARE = 0.6
 """Of a kicked ball's speed that is left when it has ceased to slide: 1 / (1 + I / m r^2), with 2/3 for a thin shell."""
 LEAST_VARIANCE = 1e-12  # [m^2/s^2] keeps the inverse of a velocity's covariance finite
+LEAST = LEAST_VARIANCE * np.eye(2)
 
 
 @dataclass(frozen=True)
@@ -55,14 +56,15 @@ def slowing(velocity: Array, covariance: Array, deceleration: float, duration: f
         deceleration: a [m/s^2].
         duration: [s].
     """
-    spread = covariance + LEAST_VARIANCE * np.eye(2)
+    spread = covariance + LEAST
     root = math.sqrt(2.0) * np.linalg.cholesky(spread).T
-    before = velocity + np.vstack((root, -root))
+    before = velocity + np.concatenate((root, -root))
     after = slowed(before, deceleration, duration)
-    mean = after.mean(axis=0)
-    crossed = (before - velocity).T @ (after - mean) / len(before)
+    mean = after.sum(axis=0) / len(after)
+    off = after - mean
+    crossed = (before - velocity).T @ off / len(before)
     keep = np.linalg.solve(spread, crossed).T
-    noise = (after - mean).T @ (after - mean) / len(before) - keep @ spread @ keep.T
+    noise = off.T @ off / len(before) - keep @ spread @ keep.T
     values, vectors = np.linalg.eigh((noise + noise.T) / 2.0)
     return Slowing(keep, mean - keep @ velocity, (vectors * np.maximum(values, 0.0)) @ vectors.T)
 

@@ -20,6 +20,7 @@ from tulip_sim.match_lockstep import play_lockstep
 from tulip_sim.scenario import make_scenario
 from tulip_sim.timing import FEATURE_DELAY_TICKS, TICK
 from tulip_sim.truth import Truth
+from tulip_vision.lens import Lens
 from tulip_worldmodel.world_state import WorldState
 
 pytestmark = pytest.mark.sim
@@ -30,7 +31,6 @@ WALKING = 8.0  # [s] the referee lets the robot play after 5: it has begun to wa
 RECORDED = 3.0  # [s]
 NOT_IN_LOCKSTEP = {
     topics.CAMERA_IMAGE,  # as JPEG only
-    topics.CAMERA_INFO,
     topics.VISION_PICTURE,
     topics.ROBOT_DESCRIPTION,
     topics.DIAGNOSTICS,
@@ -44,6 +44,8 @@ def _bits(value: object) -> object:
     """Turn a value into nested tuples that are equal only if every bit is: NaN equals itself, 0.0 is not -0.0."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return tuple((each.name, _bits(getattr(value, each.name))) for each in dataclasses.fields(value))
+    if isinstance(value, Lens):
+        return str(value.to_camera_info())
     if isinstance(value, np.ndarray):
         return value.shape, str(value.dtype), hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
     if isinstance(value, float):

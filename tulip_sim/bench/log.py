@@ -1,4 +1,4 @@
-"""Recording: what it costs, how fast it is, how large, and what is left when the recorder is killed."""
+"""Recording: cost, speed, size, recomputing, and what is left when the recorder is killed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tulip_sim.bench import log_kill, log_match, log_replay, log_throughput
+from tulip_sim.bench import log_kill, log_match, log_recompute, log_replay, log_throughput
 from tulip_sim.bench.runner import Bench, Row
 
 SHARE, SIZE, LOSS = 0.10, 150.0, 1.0  # asked for: of a core; [MB] of 10 minutes; [s] lost at most
@@ -19,6 +19,7 @@ PARTS: dict[str, Callable[..., Row]] = {
     "throughput": log_throughput.measure,
     "replay": log_replay.measure,
     "kill": log_kill.measure,
+    "recompute": log_recompute.measure,
 }
 TRIALS = [
     ("match", 1, 1),
@@ -28,6 +29,7 @@ TRIALS = [
     ("throughput", "raw pictures"),
     ("replay", 1.0),
     ("replay", 2.0),
+    *(("recompute", *trial) for trial in log_recompute.TRIALS),
     *(("kill", number) for number in range(1, KILLS + 1)),
 ]
 
@@ -45,6 +47,7 @@ def summarize(rows: list[Row]) -> list[str]:
         ("match", _matches),
         ("throughput", _throughput),
         ("replay", _replays),
+        ("recompute", log_recompute.lines),
         ("kill", _kills),
     ):
         of_part = [row for row in rows if row["part"] == part]

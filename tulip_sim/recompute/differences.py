@@ -87,9 +87,10 @@ class Comparison:
         else:
             self._recorded.setdefault(stamp, deque()).append((log_time, data, decode))
 
-    def add_made(self, stamp: int, data: bytes, message: Any) -> None:
-        """Take a recomputed message."""
+    def add_made(self, stamp: int, data: bytes, message: Any) -> bool:
+        """Take a recomputed message; return whether it has a recorded counterpart already that is equal."""
         self.difference.recomputed += 1
+        equal = self.difference.equal
         waiting = self._recorded.get(stamp)
         if waiting:
             self._compare(*waiting.popleft(), data, message)
@@ -97,6 +98,7 @@ class Comparison:
                 del self._recorded[stamp]
         else:
             self._made.setdefault(stamp, deque()).append((data, message))
+        return self.difference.equal > equal
 
     def finish(self) -> None:
         """Note the first recorded message without a counterpart."""
@@ -115,9 +117,7 @@ class Comparison:
             difference.see(self._measure(decode(), message))
 
     def _same(self, data: bytes, made: bytes) -> bool:
-        """Return whether two messages differ in nothing but the gaps between their numbers."""
-        if len(data) != len(made):
-            return False
+        """Return whether two messages differ in nothing but the gaps between their numbers and behind the last one."""
         try:
             return without_gaps(self._type, data) == without_gaps(self._type, made)
         except ValueError:

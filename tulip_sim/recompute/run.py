@@ -152,12 +152,12 @@ class _Robot:
         """Write and compare recomputed messages, and let the later stages hear them."""
         for made in messages:
             data = serialize_message(made.message)
-            if made.name in self.comparisons:
-                self.comparisons[made.name].add_made(made.stamp, data, made.message)
+            comparison = self.comparisons.get(made.name)
+            equal = comparison is not None and comparison.add_made(made.stamp, data, made.message)
             if self.bag is not None:
                 self.bag.write(self._declared(made.name), data, made.log_time)
             if self.judge is not None:
-                self.judge.take_made(made)
+                self.judge.take_made(made, equal)
             for index in range(first, len(self.stages)):
                 if made.name in self.stages[index].reads:
                     self._spread(self.stages[index].hear(made), index + 1)

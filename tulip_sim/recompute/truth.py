@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,8 @@ NEAREST = 30_000_000  # [ns] between a moment and the truth that it is judged by
 KEPT = 100  # truths: 2 s, longer than features take
 RANGE = 4.0  # [m] up to which a ball in the picture is expected to be found
 NEAR = math.radians(5.0)  # [rad] of azimuth within which a ball counts as found
+JUDGED = 100_000_000  # [ns] between two states that are judged: estimates err for longer than that
+FRESH = 0.5  # [s] since the ball was seen, up to which its place counts: it may have been kicked since
 UPRIGHT = 0.5  # [rad] of the trunk's tilt up to which localization counts
 
 
@@ -35,7 +39,7 @@ class Judgement:
     Attributes:
         position: RMS of the robot's estimated position while it is upright [m].
         heading: The same of its heading [rad].
-        ball: Median error of the ball's estimated place, relative to the robot, while it is known [m].
+        ball: Median error of the ball's estimated place, relative to the robot, up to `FRESH` after it was seen [m].
         ball_recall: Share of the pictures that show the ball whole within `RANGE`, in which it was found.
         pictures_with_ball: How many pictures these are.
         latency: Median time from a picture to its features, by simulated log times [s].
@@ -63,6 +67,8 @@ class _Sums:
         self.ball: list[float] = []
         self.found: list[bool] = []
         self.latency: list[float] = []
+        self.next_state = 0
+        """Stamp from which on the next state is judged [ns]."""
 
     def judgement(self) -> Judgement:
         def rms(values: list[float]) -> float:
@@ -75,6 +81,18 @@ class _Sums:
         return Judgement(
             rms(self.position), rms(self.heading), median(self.ball), recall, len(self.found), median(self.latency)
         )
+
+
+class _Moment:
+    """What really was at one moment."""
+
+    def __init__(self, heard: Heard, poles: bool) -> None:
+        self.stamp = heard.stamp
+        self._heard, self._poles = heard, poles
+
+    @cached_property
+    def truth(self) -> Truth:
+        return truth_from_message(self._heard.message, self._poles)
 
 
 class Judge:
@@ -90,56 +108,63 @@ class Judge:
         """
         parameters = PerceptionParameters(ball_range=RANGE)
         self._perception = Perception(parameters, field, load_robot(), head_camera_lens())
-        self._truths: deque[tuple[int, Any]] = deque(maxlen=KEPT)
+        self._moments: deque[_Moment] = deque(maxlen=KEPT)
+        self._waiting: dict[tuple[str, int], deque[tuple[Heard, _Moment]]] = {}
         self._shows_ball: dict[int, bool] = {}
         self._recorded, self._made = _Sums(), _Sums()
         self._poles = bool(field.poles)
 
     def take_recorded(self, heard: Heard) -> None:
-        """Take a recorded message."""
+        """Take a recorded message; it is judged when it turns out that its recomputed counterpart is another one."""
         if heard.name == topics.GROUND_TRUTH.name:
-            self._truths.append((heard.stamp, heard))
+            self._moments.append(_Moment(heard, self._poles))
         elif heard.name in self.reads:
-            self._take(self._recorded, heard)
+            _add_latency(self._recorded, heard)
+            moment = self._moment(heard.stamp)
+            if moment is not None:
+                self._waiting.setdefault((heard.name, heard.stamp), deque()).append((heard, moment))
 
-    def take_made(self, made: Made) -> None:
-        """Take a recomputed message."""
-        if made.name in self.reads:
-            self._take(self._made, made)
+    def take_made(self, made: Made, equal: bool) -> None:
+        """Take a recomputed message, which is equal to its recorded counterpart or not."""
+        if made.name not in self.reads:
+            return
+        _add_latency(self._made, made)
+        waiting = self._waiting.get((made.name, made.stamp))
+        if waiting and equal:
+            _, moment = waiting.popleft()
+            self._judge((self._recorded, self._made), made, moment)
+            return
+        if waiting:
+            self._judge((self._recorded,), *waiting.popleft())
+        found = self._moment(made.stamp)
+        if found is not None:
+            self._judge((self._made,), made, found)
 
     def judgements(self) -> tuple[Judgement, Judgement]:
-        """Return the figures of what was recorded and of what was recomputed."""
+        """Return the figures of what was recorded and of what was recomputed, at the end."""
+        for waiting in self._waiting.values():
+            while waiting:
+                self._judge((self._recorded,), *waiting.popleft())
         return self._recorded.judgement(), self._made.judgement()
 
-    def _take(self, sums: _Sums, message: Heard | Made) -> None:
-        if message.name == topics.FEATURES.name and message.log_time < UNIX_TIME:
-            sums.latency.append((message.log_time - message.stamp) * 1e-9)
-        truth = self._truth(message.stamp)
-        if truth is None:
-            return
+    def _moment(self, stamp: int) -> _Moment | None:
+        """Return the moment nearest to a stamp [ns]."""
+        nearest: _Moment | None = None
+        for each in reversed(self._moments):
+            if nearest is not None and abs(each.stamp - stamp) > abs(nearest.stamp - stamp):
+                break
+            nearest = each
+        return nearest if nearest is not None and abs(nearest.stamp - stamp) <= NEAREST else None
+
+    def _judge(self, sums: Sequence[_Sums], message: Heard | Made, moment: _Moment) -> None:
         if message.name == topics.FEATURES.name:
-            self._judge_features(sums, message.message, truth)
-        else:
-            self._judge_state(sums, message.message, truth)
+            self._judge_features(sums, message.message, moment.truth)
+        elif due := [each for each in sums if not 0 < each.next_state - message.stamp <= JUDGED]:
+            for each in due:
+                each.next_state = message.stamp + JUDGED
+            _judge_state(due, message.message, moment.truth)
 
-    def _truth(self, stamp: int) -> Truth | None:
-        """Return the truth nearest to a stamp [ns]."""
-        if not self._truths:
-            return None
-        at, heard = min(self._truths, key=lambda entry: abs(entry[0] - stamp))
-        return truth_from_message(heard.message, self._poles) if abs(at - stamp) <= NEAREST else None
-
-    def _judge_state(self, sums: _Sums, state: Any, truth: Truth) -> None:
-        true = truth.footprint
-        x, y = truth.base_orientation[:2].tolist()
-        if 1.0 - 2.0 * (x * x + y * y) > math.cos(UPRIGHT):
-            sums.position.append(math.hypot(state.robot_pose[0] - true.x, state.robot_pose[1] - true.y))
-            sums.heading.append(wrap_angle(float(state.robot_pose[2]) - true.yaw))
-        if state.ball_known:
-            here = true.inverse().transform(truth.ball_position[:2])
-            sums.ball.append(math.hypot(state.ball.position[0] - here[0], state.ball.position[1] - here[1]))
-
-    def _judge_features(self, sums: _Sums, features: Any, truth: Truth) -> None:
+    def _judge_features(self, sums: Sequence[_Sums], features: Any, truth: Truth) -> None:
         stamp = stamp_of(features)
         if stamp not in self._shows_ball:
             self._shows_ball[stamp] = self._perception.ball_in_view(truth)
@@ -148,4 +173,24 @@ class Judge:
         x, y = truth.footprint.inverse().transform(truth.ball_position[:2])
         azimuth = math.atan2(y - features.camera_position[1], x - features.camera_position[0])
         balls = (each.azimuth for each in features.features if each.kind == FeatureClass.BALL)
-        sums.found.append(any(abs(wrap_angle(each - azimuth)) < NEAR for each in balls))
+        found = any(abs(wrap_angle(each - azimuth)) < NEAR for each in balls)
+        for each in sums:
+            each.found.append(found)
+
+
+def _judge_state(sums: Sequence[_Sums], state: Any, truth: Truth) -> None:
+    true = truth.footprint
+    x, y = truth.base_orientation[:2].tolist()
+    upright = 1.0 - 2.0 * (x * x + y * y) > math.cos(UPRIGHT)
+    here = true.inverse().transform(truth.ball_position[:2])
+    for each in sums:
+        if upright:
+            each.position.append(math.hypot(state.robot_pose[0] - true.x, state.robot_pose[1] - true.y))
+            each.heading.append(wrap_angle(float(state.robot_pose[2]) - true.yaw))
+        if state.ball_known and state.ball.age <= FRESH:
+            each.ball.append(math.hypot(state.ball.position[0] - here[0], state.ball.position[1] - here[1]))
+
+
+def _add_latency(sums: _Sums, message: Heard | Made) -> None:
+    if message.name == topics.FEATURES.name and message.log_time < UNIX_TIME:
+        sums.latency.append((message.log_time - message.stamp) * 1e-9)

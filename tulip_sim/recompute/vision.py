@@ -17,7 +17,6 @@ from tulip_description.robot import HEAD_JOINTS, load_robot
 from tulip_ros import topics
 from tulip_ros.time import stamp_of
 from tulip_sim.recompute.heard import OVERDUE, UNIX_TIME, Heard, Made
-from tulip_vision.features import Features
 from tulip_vision.lens import Lens, head_camera_lens
 from tulip_vision.messages import features_to_message, lens_from_message, picture_from_message
 from tulip_vision.own_body import OwnBody
@@ -33,7 +32,8 @@ class VisionStage:
     """Node vision.
 
     Features do not depend on the order in which a picture and the readings of its camera's pose came, since a picture
-    waits for the readings around it. So recorded features tell only when they were sent.
+    waits for the readings around it. Recorded features tell when they were sent, and which pictures were used: a node
+    that is too slow leaves some out.
     """
 
     writes = frozenset((FEATURES,))
@@ -55,13 +55,11 @@ class VisionStage:
         self._poses = PoseBuffer(PoseBufferParameters(), partial(camera_in_footprint, self._robot, mount=load_mount()))
         self._pictures: deque[Heard] = deque()
         self._joints: Heard | None = None
-        self._found: dict[int, Features] = {}
         self._asked: deque[Heard] = deque()
         self._counts: Counter[str] = Counter()
-        self._delay = 0  # [ns] of log time from a picture to its features, as recorded last
 
     def hear(self, heard: Heard | Made) -> Iterator[Made]:
-        """Take a reading or a picture; process the pictures whose pose is known."""
+        """Take a reading or a picture."""
         message = heard.message if heard.name in (ODOMETRY, LENS) else None
         if heard.name == ODOMETRY:
             self._add_body(heard, message)
@@ -84,10 +82,8 @@ class VisionStage:
         yield from self._process(recorded.log_time)
 
     def finish(self) -> Iterator[Made]:
-        """Send what is left."""
+        """Send the features whose readings never came."""
         yield from self._process(None)
-        for stamp in sorted(self._found):
-            yield from self._send(stamp, stamp + self._delay)
 
     def shortcomings(self) -> dict[str, int]:
         """Return what could not be computed, by reason."""
@@ -109,36 +105,39 @@ class VisionStage:
             self._poses.add_head(stamp_of(heard.message), *(float(angles[name]) for name in HEAD_JOINTS))
 
     def _process(self, now: int | None) -> Iterator[Made]:
-        while self._pictures:
-            heard = self._pictures[0]
-            pose = self._poses.camera_in_footprint(heard.stamp)
-            if isinstance(pose, MissingPose):
-                if pose.may_come and now is not None and now - heard.log_time < OVERDUE:
-                    break
-                self._counts["pictures without a camera pose"] += 1
-            elif pose[2, 3] > 0.0:  # a fallen robot's belief puts the camera below the ground: nothing to see
-                try:
-                    picture = decoded(heard)
-                    self._found[heard.stamp] = self._vision.process(picture, heard.stamp, pose)
-                except ValueError:
-                    self._counts["unusable pictures"] += 1
-            self._pictures.popleft()
+        """Answer the recorded features whose picture and pose are here.
+
+        Args:
+            now: Log time [ns], by which some may have waited too long; None at the end.
+        """
         while self._asked:
             asked = self._asked[0]
-            if asked.stamp not in self._found:
-                if now is not None and now - asked.log_time < OVERDUE:
+            while self._pictures and self._pictures[0].stamp < asked.stamp:
+                self._pictures.popleft()
+                self._counts["pictures that the run's vision left out, and this one too"] += 1
+            waited = now is None or now - asked.log_time >= OVERDUE
+            if not self._pictures or self._pictures[0].stamp > asked.stamp:
+                if not (self._pictures or waited):
                     return
-                self._counts["features whose picture is not recorded"] += 1
+                # A recorder keeps every second picture unless told otherwise; who hears vision needs all features.
+                self._counts["features taken over as they were recorded, since their picture was not"] += 1
+                self._asked.popleft()
+                yield Made(FEATURES, asked.log_time, asked.stamp, asked.message)
+                continue
+            pose = self._poses.camera_in_footprint(asked.stamp)
+            if isinstance(pose, MissingPose) and pose.may_come and not waited:
+                return
             self._asked.popleft()
-            self._delay = max(0, asked.log_time - asked.stamp) if asked.log_time < UNIX_TIME else 0
-            yield from self._send(asked.stamp, asked.log_time)
-            for stamp in [each for each in self._found if each < asked.stamp - OVERDUE]:
-                yield from self._send(stamp, asked.log_time)  # the run had no features of that picture
-
-    def _send(self, stamp: int, log_time: int) -> Iterator[Made]:
-        features = self._found.pop(stamp, None)
-        if features is not None:
-            yield Made(FEATURES, log_time, stamp, features_to_message(features))
+            picture = self._pictures.popleft()
+            if isinstance(pose, MissingPose):
+                self._counts["features whose camera pose is not recorded"] += 1
+                continue
+            try:
+                features = self._vision.process(decoded(picture), asked.stamp, pose)
+            except ValueError:
+                self._counts["unusable pictures"] += 1
+                continue
+            yield Made(FEATURES, asked.log_time, asked.stamp, features_to_message(features))
 
 
 def decoded(heard: Heard) -> NDArray[np.uint8]:
