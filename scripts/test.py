@@ -8,6 +8,7 @@ The exit code is 0 when everything passed, 1 when something failed, 2 when the e
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 
@@ -19,6 +20,8 @@ CHECKS: tuple[tuple[str, ...], ...] = (
     ("mypy",),
     ("lint-imports",),
 )
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+"""What tests of pages run in, where one is installed; they are skipped elsewhere."""
 NO_TESTS = 5  # pytest's exit code when nothing matched
 
 
@@ -56,5 +59,5 @@ def test_variables() -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    _environment.prepare(extras=("test",))
+    _environment.prepare(extras=("test", "browser") if any(map(shutil.which, BROWSERS)) else ("test",))
     raise SystemExit(main())

@@ -22,8 +22,8 @@ from mcap.summary import Summary
 RECORD = struct.Struct("<BQ")  # opcode and length
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
-Message = tuple[int, int, int, bytes]
-"""Channel, sequence, log time [ns] and serialized data."""
+Message = tuple[int, int, int, int, bytes]
+"""Channel, sequence, log time, publish time [ns] and serialized data."""
 
 
 def messages_of(
@@ -98,9 +98,9 @@ def _wanted(data: bytes, channels: Collection[int]) -> Iterator[tuple[int, Messa
             opcode, length = RECORD.unpack_from(data, place)
             body = place + RECORD.size
             if opcode == Opcode.MESSAGE:
-                channel, sequence, log_time, _ = MESSAGE.unpack_from(data, body)
+                channel, sequence, log_time, published = MESSAGE.unpack_from(data, body)
                 if channel in channels:
-                    yield place, (channel, sequence, log_time, data[body + MESSAGE.size : body + length])
+                    yield place, (channel, sequence, log_time, published, data[body + MESSAGE.size : body + length])
             place = body + length
     except struct.error as error:
         raise McapError(f"a chunk ends in the middle of a record: {error}") from error

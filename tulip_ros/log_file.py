@@ -68,12 +68,14 @@ class Record:
     Attributes:
         topic: Of which topic.
         log_time: When it came in [ns since 1970; of simulated time in a lockstep recording].
+        publish_time: When it was sent [ns], as log_time.
         sequence: Number of the message on its topic.
         data: Serialized (CDR).
     """
 
     topic: LoggedTopic
     log_time: int
+    publish_time: int
     sequence: int
     data: bytes
 
@@ -190,11 +192,11 @@ class Log:
             repeated = self._repeated[number]
             channels = {key: wanted[each.topic] for key, each in summary.channels.items() if each.topic in wanted}
             try:
-                for channel, sequence, log_time, data in messages_of(stream, summary, channels, start, end):
+                for channel, sequence, log_time, published, data in messages_of(stream, summary, channels, start, end):
                     topic = channels[channel]
                     if topic.name in repeated and sequence <= repeated[topic.name][1]:
                         continue  # the file before had it
-                    yield Record(topic, log_time, sequence, data)
+                    yield Record(topic, log_time, published, sequence, data)
             except DAMAGES as error:
                 raise DamagedLogError(file, f"is damaged ({error})") from error
 
@@ -232,7 +234,9 @@ class Log:
             begin = stream.read(len(MAGIC))
             stream.seek(0)
             if not begin:
-                raise BadInputError(f"Recording {file} is empty.")
+                raise BadInputError(
+                    f"Recording {file} is empty: nothing was written before its recorder ended. Expected an MCAP file."
+                )
             if begin != MAGIC:
                 raise BadInputError(f"{file} is no MCAP file; expected a recording of `record.py` or `match.py`.")
             if file.stat().st_size < SHORTEST:

@@ -84,6 +84,7 @@ class Lockstep(RobotStack):
             self.step()
             if progress is not None and self._tick % every == 0:
                 progress(self)
+        self._tell_truth(self.stamp)  # with the outcome
         return self.referee.outcome
 
     def close(self) -> None:

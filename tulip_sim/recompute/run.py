@@ -130,7 +130,8 @@ class _Robot:
             stamp = time_at(heard.record.data, FIRST) if name == topics.TF.name else heard.stamp
             self.comparisons[name].add_recorded(stamp, heard.log_time, heard.record.data, lambda: heard.message)
         elif self.bag is not None:
-            self.bag.write(heard.record.topic.name, heard.record.data, heard.log_time)
+            record = heard.record
+            self.bag.write(record.topic.name, record.data, record.log_time, record.publish_time)
         if self.judge is not None:
             self.judge.take_recorded(heard)
         if name == COMPRESSED and name == self.pictures and not self.lossy:
@@ -194,7 +195,7 @@ def _run(log: Log, robots: Sequence[_Robot], bag: Bag | None, progress: Callable
             robot, name = route
             robot.take(Heard(name, record, log))
         elif bag is not None:
-            bag.write(record.topic.name, record.data, record.log_time)
+            bag.write(record.topic.name, record.data, record.log_time, record.publish_time)
         if progress is not None and number % PROGRESS == 0:
             progress((record.log_time - begin) * 1e-9)
     shortcomings = []
