@@ -26,6 +26,8 @@ PACKAGES = (
     *("tulip-soccer", "ros-jazzy-rclpy", "ros-rmw-fastrtps-cpp", "mcap", "numpy", "scipy", "pin", "filterpy", "numba"),
     *("opencv-python-headless", "pybullet", "py_trees"),
 )
+LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""As safe as the other, and ten times as fast where its library is there."""
 FILES = (
     (tulip_description, ("robot.yaml", "field.yaml", "camera_mount.yaml")),
     (tulip_motion, ("gait.yaml",)),
@@ -122,7 +124,7 @@ def parameters_of(log: Log) -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     for each in log.attachments():
         if each.name.startswith(PARAMETERS):
-            found.update(yaml.safe_load(each.data))
+            found.update(yaml.load(each.data, LOADER))
     return found
 
 

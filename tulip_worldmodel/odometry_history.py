@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_description.quaternion import pose_on_ground
 from tulip_motion.interface import Odometry
+from tulip_worldmodel.positive_part import positive_part
 
 Array = NDArray[np.float64]
 
@@ -84,8 +85,7 @@ def slip_between(earlier: PathPoint, later: PathPoint) -> Array | None:
     carried[:2, 2] = earlier.pose.y - later.pose.y, later.pose.x - earlier.pose.x
     added = (later.covariance - carried @ earlier.covariance @ carried.T)[:2, :2]
     turn = earlier.pose.rotation()
-    values, vectors = np.linalg.eigh(turn.T @ added @ turn)
-    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
+    return positive_part(turn.T @ added @ turn)
 
 
 class OdometryHistory:

@@ -17,6 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_worldmodel.positive_part import positive_part
+
 Array = NDArray[np.float64]
 
 DECELERATION = 0.35  # [m/s^2] of a ball on carpet; let one roll 2 m and stop the time to measure it
@@ -65,8 +67,7 @@ def slowing(velocity: Array, covariance: Array, deceleration: float, duration: f
     crossed = (before - velocity).T @ off / len(before)
     keep = np.linalg.solve(spread, crossed).T
     noise = off.T @ off / len(before) - keep @ spread @ keep.T
-    values, vectors = np.linalg.eigh((noise + noise.T) / 2.0)
-    return Slowing(keep, mean - keep @ velocity, (vectors * np.maximum(values, 0.0)) @ vectors.T)
+    return Slowing(keep, mean - keep @ velocity, positive_part(noise))
 
 
 def rest(position: Array, velocity: Array, deceleration: float) -> tuple[Array, float]:

@@ -171,12 +171,14 @@ def _estimate(
     state = point.state
     relative = np.array(robot.pose_in_odom.inverse().transform(state[:2]))
     velocity = to_footprint @ state[2:]
+    in_map = robot.pose.transform(relative)
+    told = fixed_point(np.concatenate((relative, velocity, in_map, robot.pose.rotation() @ velocity)))
     return ObjectEstimate(
-        position=fixed_point(relative),
-        velocity=fixed_point(velocity),
+        position=told[:2],
+        velocity=told[2:4],
         covariance=significant(both @ point.covariance @ both.T),
-        position_in_map=fixed_point(np.array(robot.pose.transform(relative))),
-        velocity_in_map=fixed_point(robot.pose.rotation() @ velocity),
+        position_in_map=told[4:6],
+        velocity_in_map=told[6:],
         age=max(0.0, (stamp - last_seen) * 1e-9),
         confidence=confidence,
     )

@@ -112,7 +112,8 @@ class _Robot:
         }
         self.lossy = False
         self.forgotten = p.forgotten
-        self.judge = Judge(p.field) if judge and _full(namespace, topics.GROUND_TRUTH.name) in log.topics else None
+        has_truth = judge and _full(namespace, topics.GROUND_TRUTH.name) in log.topics
+        self.judge = Judge(p.field, self.writes) if has_truth else None
         self.bag: Bag | None = None
         self._topics: dict[str, LoggedTopic] = {}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
@@ -83,6 +83,9 @@ class _Sums:
         )
 
 
+JUDGED_TOPICS = frozenset((topics.WORLD_STATE.name, topics.FEATURES.name))
+
+
 class _Moment:
     """What really was at one moment."""
 
@@ -98,14 +101,14 @@ class _Moment:
 class Judge:
     """Judges one robot."""
 
-    reads = frozenset((topics.GROUND_TRUTH.name, topics.WORLD_STATE.name, topics.FEATURES.name))
-
-    def __init__(self, field: Field) -> None:
+    def __init__(self, field: Field, judged: Collection[str] = JUDGED_TOPICS) -> None:
         """Begin.
 
         Args:
             field: As the robot's team sees it.
+            judged: Topics whose messages count; those that are not computed anew need not.
         """
+        self.reads = frozenset((topics.GROUND_TRUTH.name, *(set(judged) & JUDGED_TOPICS)))
         parameters = PerceptionParameters(ball_range=RANGE)
         self._perception = Perception(parameters, field, load_robot(), head_camera_lens())
         self._moments: deque[_Moment] = deque(maxlen=KEPT)
