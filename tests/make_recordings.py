@@ -24,6 +24,7 @@ from sensor_msgs.msg import CompressedImage
 from tulip_description.field import load_field
 from tulip_ros.log_edit import writing
 from tulip_ros.log_file import Log
+from tulip_ros.serialized import time_at
 from tulip_ros.time import stamp_of
 from tulip_sim.lockstep import Lockstep, Settings
 from tulip_sim.lockstep_match import LockstepMatch
@@ -33,7 +34,6 @@ from tulip_sim.match_rules import NAMESPACES
 from tulip_sim.match_settings import MatchSettings
 from tulip_sim.messages import jpeg_to_message
 from tulip_sim.perception import PerceptionParameters
-from tulip_sim.recompute.heard import time_at
 from tulip_sim.recompute.run import recompute
 from tulip_sim.referee import RefereeParameters
 from tulip_sim.robot_stack import RobotSettings
@@ -98,7 +98,7 @@ def thin(source: Path, folder: Path, names: tuple[str, ...]) -> None:
             if name.endswith("/compressed") and counts[name] % 2:
                 dropped.add(record.log_time)
                 continue
-            if name.endswith("/features") and time_at(data, 4) in dropped:
+            if name.endswith("/features") and time_at(data) in dropped:
                 continue
             if record.topic.name.endswith("/compressed"):
                 message = deserialize_message(data, CompressedImage)

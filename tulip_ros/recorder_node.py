@@ -22,7 +22,7 @@ from tulip_ros.mcap_file import COMPRESSIONS
 from tulip_ros.node_parameters import ParameterAsker
 from tulip_ros.picture_rate import PICTURE_RATE, PictureRate
 from tulip_ros.run import ComponentNode, run
-from tulip_ros.time import serialized_stamp
+from tulip_ros.serialized import time_at
 from tulip_ros.topics import Quality
 
 LOOK = 0.5  # [s] between two looks for new topics and nodes, and at the disk
@@ -255,7 +255,7 @@ class RecorderNode(ComponentNode):
             return
         try:
             for received, sent, source, data, _ in messages:
-                if source.is_picture and not self._rate.keeps(source.name, serialized_stamp(data)):
+                if source.is_picture and not self._rate.keeps(source.name, time_at(data)):
                     continue
                 bag.add_topic(source.name, source.type_name, source.quality)
                 bag.write(source.name, data, received, sent)

@@ -5,8 +5,6 @@ Nodes take stamps from the messages that they answer; none of them reads a clock
 
 from __future__ import annotations
 
-import struct
-
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
 
@@ -39,9 +37,3 @@ def header(stamp: int, frame: str = "") -> Header:
 def stamp_of(message: object) -> int:
     """Return the stamp [ns] in a message's header."""
     return from_message(message.header.stamp)  # type: ignore[attr-defined]
-
-
-def serialized_stamp(data: bytes) -> int:
-    """Return the stamp [ns] in the header with which a serialized message begins (CDR, either byte order)."""
-    seconds, nanoseconds = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, 4)
-    return int(seconds) * NANOSECONDS + int(nanoseconds)

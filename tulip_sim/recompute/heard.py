@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from struct import Struct
 from typing import Any, Protocol
 
 from tulip_ros.log_file import Log, Record
-from tulip_ros.time import NANOSECONDS
+from tulip_ros.serialized import time_at
 
 UNIX_TIME = 10**17
 """[ns] Log times below are simulated: a lockstep's. Those of a graph count from 1970."""
 OVERDUE = 1_000_000_000
 """[ns] of log time after which an input that a recorded output names is taken for lost."""
-
-
-LITTLE, BIG = Struct("<iI"), Struct(">iI")
 
 
 @dataclass
@@ -46,24 +42,8 @@ class Heard:
 
     @property
     def stamp(self) -> int:
-        """Stamp [ns] of a message that begins with a header: the first eight bytes after those of the encoding."""
-        return time_at(self.record.data, 4)
-
-
-def time_at(data: bytes, place: int) -> int:
-    """Return the time [ns] at a place of a serialized message."""
-    seconds, nanoseconds = _order(data).unpack_from(data, place)
-    return int(seconds) * NANOSECONDS + int(nanoseconds)
-
-
-def after_header(data: bytes) -> int:
-    """Return the place of what follows the header with which a serialized message begins, at a multiple of 4."""
-    _, length = _order(data).unpack_from(data, 8)
-    return 16 + (int(length) + 3) // 4 * 4
-
-
-def _order(data: bytes) -> Struct:
-    return LITTLE if data[1] & 1 else BIG
+        """Stamp [ns] of a message that begins with a header."""
+        return time_at(self.record.data)
 
 
 @dataclass(frozen=True)

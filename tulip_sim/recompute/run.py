@@ -15,9 +15,10 @@ from tulip_ros.bag import Bag
 from tulip_ros.errors import BadInputError, unknown
 from tulip_ros.log_edit import writing
 from tulip_ros.log_file import Log, LoggedTopic, Record
+from tulip_ros.serialized import after_header, time_at
 from tulip_sim.recompute.decisions import HeadStage, StrategyStage
 from tulip_sim.recompute.differences import Comparison, Difference
-from tulip_sim.recompute.heard import UNIX_TIME, Heard, Made, Stage, after_header, time_at
+from tulip_sim.recompute.heard import UNIX_TIME, Heard, Made, Stage
 from tulip_sim.recompute.settings import RobotParameters, parameters_of
 from tulip_sim.recompute.truth import Judge, Judgement
 from tulip_sim.recompute.vision import COMPRESSED, RAW, VisionStage

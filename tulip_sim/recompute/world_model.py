@@ -20,7 +20,8 @@ from tulip_motion.interface import Odometry
 from tulip_motion.messages import odometry_from_message
 from tulip_ros import topics
 from tulip_ros.cdr import HEAD
-from tulip_sim.recompute.heard import OVERDUE, UNIX_TIME, Heard, Made, after_header, time_at
+from tulip_ros.serialized import after_header, time_at
+from tulip_sim.recompute.heard import OVERDUE, UNIX_TIME, Heard, Made
 from tulip_vision.features import Features
 from tulip_worldmodel.messages import (
     features_from_message,
