@@ -40,7 +40,7 @@ def build_urdf(robot: Robot, marker: str = "cyan", mount_frames: bool = True) ->
         if not joint.fixed:
             ElementTree.SubElement(element, "axis", xyz=_text(joint.axis))
             limits = {"lower": joint.lower, "upper": joint.upper, "effort": joint.effort, "velocity": joint.velocity}
-            ElementTree.SubElement(element, "limit", {key: repr(value) for key, value in limits.items()})
+            ElementTree.SubElement(element, "limit", {key: repr(float(value)) for key, value in limits.items()})
             ElementTree.SubElement(element, "dynamics", damping="0", friction="0")
     if mount_frames:
         mounts = [(frames.LEFT_SOLE, robot.soles[0]), (frames.RIGHT_SOLE, robot.soles[1]), (frames.IMU, robot.imu)]
@@ -63,8 +63,8 @@ def _add_link(root: ElementTree.Element, link: Link, marker: str) -> None:
     element = ElementTree.SubElement(root, "link", name=link.name)
     inertial = ElementTree.SubElement(element, "inertial")
     ElementTree.SubElement(inertial, "origin", xyz=_text(link.com), rpy="0 0 0")
-    ElementTree.SubElement(inertial, "mass", value=repr(link.mass))
-    ixx, iyy, izz = (repr(value) for value in link.inertia)
+    ElementTree.SubElement(inertial, "mass", value=repr(float(link.mass)))
+    ixx, iyy, izz = (repr(float(value)) for value in link.inertia)
     ElementTree.SubElement(inertial, "inertia", ixx=ixx, iyy=iyy, izz=izz, ixy="0", ixz="0", iyz="0")
     for box in link.boxes:
         colour = marker if box.colour == "marker" else box.colour
@@ -93,4 +93,4 @@ def _add_joint(
 
 
 def _text(vector: tuple[float, ...]) -> str:
-    return " ".join(repr(value) for value in vector)
+    return " ".join(repr(float(value)) for value in vector)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +87,16 @@ def test_urdf_has_the_same_dynamics_as_the_model(variant: str) -> None:
         return np.concatenate([torque[:6], torque[order]])
 
     np.testing.assert_allclose(force(read), force(ours), atol=1e-9)
+
+
+def test_urdf_of_a_robot_whose_numbers_are_those_of_numpy_is_the_same() -> None:
+    """numpy writes its own numbers as np.float64(1.0), which simulators read as 0 without a word."""
+    robot = load_robot()
+    links = tuple(
+        replace(link, mass=np.float64(link.mass), com=tuple(np.array(link.com)), inertia=tuple(np.array(link.inertia)))
+        for link in robot.links
+    )
+    assert build_urdf(replace(robot, links=links)) == build_urdf(robot)
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
