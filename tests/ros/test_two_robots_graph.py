@@ -76,7 +76,9 @@ def test_a_short_match_runs_to_its_end_and_is_recorded_in_two_namespaces(tmp_pat
                     wishes[space].append({0: "play", 1: "stop", 2: "stand", 5: "limp"}[wish.request])
     assert report == summary.report
     for space in NAMESPACES:
-        assert wishes[space] == ["stop", *["limp", "stand", "play"] * 2]
+        # The first wish, to do nothing, may be replaced before the recorder has found the node that said it.
+        assert wishes[space][-6:] == ["limp", "stand", "play"] * 2
+        assert wishes[space][:-6] in ([], ["stop"])
         assert counts[f"/{space}/initialpose"] == 2
         assert counts[f"/{space}/features"] > 20
         assert counts[f"/{space}/game_state"] > 6
