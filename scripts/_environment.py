@@ -65,6 +65,10 @@ class SetupError(Exception):
     """The environment cannot be made; the message names the cause and the remedy."""
 
 
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+"""What tests of pages run in, where one is installed; they are skipped elsewhere."""
+
+
 def prepare(extras: Sequence[str] = ()) -> None:
     """Return inside a complete environment; otherwise make it and run the script again in it.
 

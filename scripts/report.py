@@ -17,7 +17,7 @@ from typing import Annotated
 import typer
 from _progress import progress
 
-from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable
+from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_new_file
 from tulip_ros.log_file import Log
 from tulip_view.recording import choose_robot, expected_messages, robots_in
 from tulip_view.report.build import WANTED, Report, make_report
@@ -41,7 +41,7 @@ def main(
             page = to or _default(file, chosen if others else "")
             targets = [page, *([page.with_suffix(".pdf")] if pdf else [])]
             for target in targets:
-                check_target(target, force)
+                check_new_file(target, "--to", force)
             if png is not None and png.exists() and (not png.is_dir() or (any(png.iterdir()) and not force)):
                 raise BadInputError(f"--png {png} is not an empty folder; name another one, or give --force.")
             with progress() as bar:
@@ -69,21 +69,6 @@ def main(
         print(f"wrote {target} ({target.stat().st_size / 2**20:.1f} MiB)")
     if png is not None:
         print(f"wrote {len(written)} pictures to {png}")
-
-
-def check_target(path: Path, force: bool) -> None:
-    """Refuse a file that exists, or cannot be written, before the work for it is done.
-
-    Raises:
-        BadInputError: if so.
-    """
-    if path.is_dir():
-        raise BadInputError(f"{path} is a folder; expected the name of a file.")
-    if path.exists() and not force:
-        raise BadInputError(f"{path} exists; name another file with --to, or give --force to replace it.")
-    if not path.parent.is_dir():
-        raise BadInputError(f"There is no folder {path.parent}; make it, or name another file with --to.")
-    check_writable(path, "--to")
 
 
 def write(report: Report, page: Path, pdf: bool, png: Path | None, working: Callable[[str], None]) -> list[Path]:

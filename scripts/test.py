@@ -20,8 +20,6 @@ CHECKS: tuple[tuple[str, ...], ...] = (
     ("mypy",),
     ("lint-imports",),
 )
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-"""What tests of pages run in, where one is installed; they are skipped elsewhere."""
 NO_TESTS = 5  # pytest's exit code when nothing matched
 
 
@@ -59,5 +57,5 @@ def test_variables() -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    _environment.prepare(extras=("test", "browser") if any(map(shutil.which, BROWSERS)) else ("test",))
+    _environment.prepare(extras=("test", "browser") if any(map(shutil.which, _environment.BROWSERS)) else ("test",))
     raise SystemExit(main())

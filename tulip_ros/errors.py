@@ -50,3 +50,23 @@ def check_writable(path: Path, option: str) -> None:
             path.unlink()
     except OSError as error:
         raise BadInputError(f"{option} {path} cannot be written: {error.strerror}. Name another file.") from error
+
+
+def check_new_file(path: Path, option: str, force: bool) -> None:
+    """Refuse a file that exists or cannot be written, before the work for it is done.
+
+    Args:
+        path: The file.
+        option: Where its name came from, as in "--to".
+        force: Whether it may be replaced.
+
+    Raises:
+        BadInputError: if so.
+    """
+    if path.is_dir():
+        raise BadInputError(f"{path} is a folder; expected the name of a file.")
+    if path.exists() and not force:
+        raise BadInputError(f"{path} exists; name another file with {option}, or give --force to replace it.")
+    if not path.parent.is_dir():
+        raise BadInputError(f"There is no folder {path.parent}; make it, or name another file with {option}.")
+    check_writable(path, option)

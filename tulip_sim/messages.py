@@ -25,7 +25,7 @@ from tulip_sim.truth import Truth
 from tulip_vision.lens import Lens
 
 Array = NDArray[np.float64]
-JPEG_QUALITY = 35  # a quarter of the bytes of quality 85, and vision finds as much (docs/recording.md)
+JPEG_QUALITY = 35  # a quarter of the bytes of quality 85, and vision finds as much (docs/decisions/0008)
 PNG_LEVEL = 1  # of zlib: noise hardly gets smaller by a higher one
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.io import savemat
 
-from tulip_ros.errors import BadInputError, check_writable
+from tulip_ros.errors import BadInputError, check_new_file
 from tulip_view.tables import Table
 
 MATLAB_NAME = re.compile(r"[A-Za-z]\w*$", re.ASCII)
@@ -39,13 +39,7 @@ def check_target(path: Path, force: bool) -> None:
             "(pip install -e '.[batch]'), or export to .csv or .mat."
         )
     for file in files_of(path):
-        if file.is_dir():
-            raise BadInputError(f"{file} is a folder; expected the name of a file.")
-        if file.exists() and not force:
-            raise BadInputError(f"{file} exists; name another file, or give --force to replace it.")
-    if not path.parent.is_dir():
-        raise BadInputError(f"There is no folder {path.parent}; make it, or name another file with --to.")
-    check_writable(path, "--to")
+        check_new_file(file, "--to", force)
 
 
 def files_of(path: Path) -> list[Path]:

@@ -11,6 +11,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from _environment import BROWSERS
 from recordings_to_view import play
 
 from tulip_ros.log_file import Log
@@ -22,7 +23,6 @@ sync_api = pytest.importorskip(
     reason="playwright is not installed: pip install -e '.[browser]' (browsers are not downloaded)",
 )
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 CHROMIUM = next((found for name in BROWSERS if (found := shutil.which(name))), None)
 pytestmark = [
     pytest.mark.browser,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 import tempfile
 import time
 from collections.abc import Callable
@@ -14,6 +13,7 @@ from tulip_ros import log_notes
 from tulip_ros.launch import Launcher
 from tulip_ros.log_file import Log
 from tulip_ros.run import ComponentNode, session
+from tulip_sim.bench.free_port import free_port
 from tulip_sim.bench.runner import Row
 from tulip_sim.match_graph import SILENCE, TrialWatcher, trial_plan
 from tulip_sim.match_rules import MatchRules
@@ -33,9 +33,9 @@ def measure(robots: int, seed: int) -> Row:
     with tempfile.TemporaryDirectory(prefix="tulip_log_") as scratch:
         record = Path(scratch) / "match"
         if robots == 1:
-            plan = trial_plan(seed, record=record, referee_port=_free_port())
+            plan = trial_plan(seed, record=record, referee_port=free_port())
         else:
-            ports = _free_port(), _free_port()
+            ports = free_port(), free_port()
             plan = match_plan(seed, MatchRules(playing_time=WATCHED), record, referee_ports=ports)
         make_watcher = TrialWatcher if robots == 1 else MatchWatcher
         with Launcher(plan) as launcher, session(make_watcher, arguments=[], handle_signals=False) as (watcher, spin):
@@ -85,9 +85,3 @@ def _has_ended(watcher: ComponentNode) -> bool:
     if isinstance(watcher, TrialWatcher):
         return watcher.truth is not None and bool(watcher.truth.outcome)
     return isinstance(watcher, MatchWatcher) and watcher.report.finished
-
-
-def _free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import socket
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
+from tulip_sim.bench.free_port import free_port
 from tulip_sim.bench.runner import Bench, Row
 from tulip_sim.match_rules import MatchRules
 from tulip_sim.match_summary import MatchSummary
@@ -30,15 +30,9 @@ def measure(mode: str, seed: int) -> Row:
 
 
 def _play_graph(seed: int) -> MatchSummary:
-    plan = match_plan(seed, GRAPH_RULES, referee_ports=(_free_port(), _free_port()))
+    plan = match_plan(seed, GRAPH_RULES, referee_ports=(free_port(), free_port()))
     with tempfile.TemporaryDirectory() as folder:
         return play_match_graph(plan, seed, say=lambda line: None, logs=Path(folder))
-
-
-def _free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def _row(summary: MatchSummary) -> Row:
