@@ -18,7 +18,7 @@ from scipy.stats import chi2
 from tulip_description.model import Side
 from tulip_description.robot import Robot
 from tulip_motion.identification.body_prior import Spread, body_prior, greatest_mass_error
-from tulip_motion.identification.com_regressor import PER_BODY, cop_rows, regressor_of, slope_of
+from tulip_motion.identification.com_regressor import PER_BODY, cop_rows, regressor_of, slope_change, slope_of
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.static_measurement import StaticMeasurement
 
@@ -129,7 +129,7 @@ def _log_likelihood(
         turn = regressor.base_rotation(measurement.joint_positions)
         com = regressor.com(measurement.joint_positions)
         rows.append(cop_rows(com, slope_of(turn @ measurement.down)))
-        nuisance.append(turn[:2, :2] * float(com[2] @ prior.mean))  # size and correlation of its effect are enough
+        nuisance.append(-float(com[2] @ prior.mean) * slope_change(turn, measurement.down))
         noise.append(measurement.cop_covariance)
     stack, mounting = np.vstack(rows), np.vstack(nuisance)
     # The masses add up to what was weighed: the prior under this condition.

@@ -20,17 +20,24 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 import scipy.optimize
 from numpy.typing import NDArray
 
 from tulip_description.model import Side
-from tulip_description.robot import SIDES, Robot
+from tulip_description.robot import Robot
 from tulip_motion.identification.base_parameters import BaseParameters, base_parameters
 from tulip_motion.identification.body_prior import Spread
 from tulip_motion.identification.cell_mixups import check_plausible
-from tulip_motion.identification.com_regressor import cop_rows, regressor_of, slope_of, standard_parameters
+from tulip_motion.identification.com_regressor import (
+    cop_rows,
+    regressor_of,
+    slope_change,
+    slope_of,
+    standard_parameters,
+)
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.static_measurement import StaticMeasurement
 from tulip_motion.lipm import GRAVITY
@@ -262,20 +269,6 @@ class _Problem:
         return values, inverse @ inverse.T, float(np.sum((rows @ values - wanted) ** 2))
 
 
-def slope_change(base_rotation: Array, down: Array) -> Array:
-    """Return (2, 2) how sigma of eq. (2b) changes with beta.
-
-    Args:
-        base_rotation: (3, 3) from base_link to the sole frame.
-        down: (3,) gravity in base_link, as the IMU tells it; in truth it is down + beta x down.
-    """
-    x, y, z = down
-    d = base_rotation @ down
-    change = base_rotation @ np.array([[0.0, z], [-z, 0.0], [y, -x]])  # columns e_x x down, e_y x down
-    changed: Array = (change[:2] - np.outer(d[:2] / d[2], change[2])) / d[2]
-    return changed
-
-
 def _check_shapes(robot: Robot, measurements: Sequence[StaticMeasurement]) -> None:
     count = len(robot.joint_names)
     for index, measurement in enumerate(measurements):
@@ -299,7 +292,7 @@ def _check_determined(
     rows = np.vstack(
         [
             base.rows(regressor_of(robot, side).com(rng.uniform(low, high)))[:2, :-1]
-            for side in SIDES_OF_MODEL
+            for side in get_args(Side)
             for _ in range(50)
         ]
     )
@@ -317,7 +310,3 @@ def _check_determined(
         f" all for {base.names[worst]}{cause}; add postures that differ in these joints, on both feet, or fix joints"
         " that stay as they are in the robot's model"
     )
-
-
-SIDES_OF_MODEL: tuple[Side, ...] = ("left", "right")
-assert SIDES_OF_MODEL == SIDES

@@ -78,19 +78,6 @@ class ComRegressor:
             rows[:, body, 1:] = placement.rotation
         return rows.reshape(3, -1)
 
-    def slope(self, joint_positions: Array, down: Array) -> Array:
-        """Return (2,) sigma of eq. (2b): how far the CoP moves, for each metre that the CoM is lower.
-
-        Args:
-            joint_positions: (n,) order of `robot.joint_names` [rad].
-            down: (3,) unit vector of gravity in base_link.
-
-        Raises:
-            ValueError: if joint_positions has a wrong shape.
-        """
-        self._move(joint_positions)
-        return slope_of(self._data.oMf[self._base].rotation @ down)
-
     def base_rotation(self, joint_positions: Array) -> Array:
         """Return (3, 3) the rotation from base_link to the sole frame in a posture (n,) [rad]."""
         self._move(joint_positions)
@@ -119,6 +106,20 @@ def slope_of(down_in_sole: Array) -> Array:
     """Return (2,) sigma of eq. (2b), given gravity's direction (3,) in the sole frame."""
     slope: Array = down_in_sole[:2] / down_in_sole[2]
     return slope
+
+
+def slope_change(base_rotation: Array, down: Array) -> Array:
+    """Return (2, 2) how sigma of eq. (2b) changes with beta.
+
+    Args:
+        base_rotation: (3, 3) from base_link to the sole frame.
+        down: (3,) gravity in base_link, as the IMU tells it; in truth it is down + beta x down.
+    """
+    x, y, z = down
+    d = base_rotation @ down
+    change = base_rotation @ np.array([[0.0, z], [-z, 0.0], [y, -x]])  # columns e_x x down, e_y x down
+    changed: Array = (change[:2] - np.outer(d[:2] / d[2], change[2])) / d[2]
+    return changed
 
 
 def cop_rows(com_rows: Array, slope: Array) -> Array:
