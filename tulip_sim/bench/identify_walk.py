@@ -98,8 +98,12 @@ def walk(seed: int, true_body: Robot, believed: Robot, learning: str) -> Walk:
                 break
         joints.append(before.joint_positions_desired - state.joint_positions)
         zmp.append(state.zmp - state.zmp_desired)
-    columns = tuple(zip(*steps, strict=True)) or ((), (), ())
-    return Walk(*columns, upright=not body.fallen)
+    return Walk(
+        tuple(step[0] for step in steps),
+        tuple(step[1] for step in steps),
+        tuple(step[2] for step in steps),
+        not body.fallen,
+    )
 
 
 def walks_fast(seed: int, true_body: Robot, believed: Robot) -> bool:

@@ -1,0 +1,114 @@
+"""How well a body foretells the CoP of postures that it was not fitted to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.stats
+from numpy.typing import NDArray
+
+from tulip_description.robot import Robot
+from tulip_motion.identification.base_parameters import base_parameters
+from tulip_motion.identification.com_regressor import regressor_of, standard_parameters
+from tulip_motion.identification.identification_error import IdentificationError
+from tulip_motion.identification.static_measurement import StaticMeasurement
+
+Array = NDArray[np.float64]
+SURE = 0.95
+"""Share of honest covariances whose NEES lies inside its bounds."""
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Measured CoP less the CoP that was foretold.
+
+    Attributes:
+        residuals: (postures, 2) with the body that was identified [m].
+        prior_residuals: (postures, 2) with the robot file [m].
+        nees: Normalized estimation error squared, by the numbers measured: 1 on average if the covariance is honest.
+        bounds: Between which an honest one lies, 95 times in 100.
+    """
+
+    residuals: Array
+    prior_residuals: Array
+    nees: float
+    bounds: tuple[float, float]
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square distance of measured and foretold CoP [m]."""
+        return _rms(self.residuals)
+
+    @property
+    def prior_rms(self) -> float:
+        """The same with the robot file [m]."""
+        return _rms(self.prior_residuals)
+
+    @property
+    def honest(self) -> bool:
+        """Whether the covariance explains the residuals, neither more nor less than it should."""
+        return self.bounds[0] <= self.nees <= self.bounds[1]
+
+
+def validate(
+    prior: Robot,
+    values: Array,
+    covariance: Array,
+    model_error: float,
+    measurements: Sequence[StaticMeasurement],
+    mount_spread: float,
+) -> Validation:
+    """Compare a body with postures.
+
+    The IMU's mounting angles are not known beforehand (they may be others on the day of these postures): their
+    covariance counts in the NEES, and of the residuals their part is taken off, found with that covariance as a prior.
+
+    Args:
+        prior: The robot file's robot; gives the kinematics.
+        values: (r,) base parameters theta_b of eq. (2), by the whole mass [m].
+        covariance: (r, r) of these [m^2].
+        model_error: s of eq. (2e) [m].
+        measurements: Of postures that were not used for the fit.
+        mount_spread: Standard deviation of the IMU's mounting angles [rad].
+
+    Raises:
+        IdentificationError: without postures.
+    """
+    if not measurements:
+        raise IdentificationError("there are no postures to validate with; leave some out of the fit, or record more")
+    base = base_parameters(prior)
+    rows = [regressor_of(prior, each.side).cop(each.joint_positions, each.down) for each in measurements]
+    known = np.vstack([base.rows(each.cop) for each in rows])
+    heights = [float(base.rows(each.com)[2] @ values) for each in rows]
+    mount = np.vstack([-height * each.slope_change for height, each in zip(heights, rows, strict=True)])
+    noise = np.zeros((2 * len(measurements),) * 2)
+    for index, each in enumerate(measurements):
+        here = slice(2 * index, 2 * index + 2)
+        noise[here, here] = each.cop_covariance + model_error**2 * np.eye(2)
+    measured = np.concatenate([each.cop for each in measurements])
+    off = measured - known @ values
+    prior_off = measured - known @ (base.combinations @ standard_parameters(prior))
+    spread = noise + known @ covariance @ known.T + mount_spread**2 * mount @ mount.T
+    nees = float(off @ np.linalg.solve(spread, off)) / len(off)
+    low, high = scipy.stats.chi2.interval(SURE, len(off))
+    return Validation(
+        (off - _mounting(off, mount, noise, mount_spread)).reshape(-1, 2),
+        (prior_off - _mounting(prior_off, mount, noise, mount_spread)).reshape(-1, 2),
+        nees,
+        (float(low) / len(off), float(high) / len(off)),
+    )
+
+
+def _mounting(off: Array, mount: Array, noise: Array, spread: float) -> Array:
+    """Return the part of residuals that the IMU's mounting explains."""
+    weighted = np.linalg.solve(noise, mount)
+    information = mount.T @ weighted + np.eye(2) / spread**2
+    part: Array = mount @ np.linalg.solve(information, weighted.T @ off)
+    return part
+
+
+def _rms(residuals: Array) -> float:
+    return math.sqrt(float(np.mean(np.sum(residuals**2, axis=1))))
