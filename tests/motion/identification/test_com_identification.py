@@ -204,7 +204,7 @@ def test_a_robot_with_other_joints_is_another_robot(held: Held) -> None:
 def test_a_posture_that_the_other_foot_helped_to_hold_is_named(held: Held) -> None:
     _, measurements = sound(held)
     measurements[7] = replace(measurements[7], normal_force=0.8 * measurements[7].normal_force)
-    with pytest.raises(IdentificationError, match="posture 7 weighs .* stance foot did not carry the robot alone"):
+    with pytest.raises(IdentificationError, match=r"posture 7 weighs .* stance foot did not carry the robot alone"):
         identify_com(ROBOT, measurements)
 
 

@@ -6,23 +6,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 from synthetic import Held, com_by_pinocchio, measure
 
 from tulip_description.pseudo_inertia import pseudo_inertia, why_impossible
 from tulip_description.robot import VARIANTS, Link, load_robot
-from tulip_motion.identification.com_identification import ComIdentification, IdentificationSettings, identify_com
+from tulip_motion.identification import physical_consistency
+from tulip_motion.identification.com_identification import ComIdentification, identify_com
 from tulip_motion.identification.com_regressor import standard_parameters
 from tulip_motion.identification.identification_error import IdentificationError
-from tulip_motion.identification.physical_consistency import LIGHTEST, check_realizable, most_probable_body
+from tulip_motion.identification.physical_consistency import check_realizable, most_probable_body
 from tulip_sim.secret_body import secret_body, table_robot
 
 ROBOT = load_robot()
 NUMBERS = st.floats(-1.0, 1.0)
 
 
+@settings(deadline=None)
 @given(st.floats(0.1, 10.0), st.tuples(NUMBERS, NUMBERS, NUMBERS), st.tuples(*[st.floats(0.01, 1.0)] * 3))
 def test_pseudo_inertia_of_six_masses_is_the_sum_of_their_products(
     mass: float, com: tuple[float, float, float], half: tuple[float, float, float]
@@ -35,6 +37,7 @@ def test_pseudo_inertia_of_six_masses_is_the_sum_of_their_products(
     assert why_impossible(mass, com, inertia) == ""  # type: ignore[arg-type]
 
 
+@settings(deadline=None)
 @given(st.floats(-1.0, 1.0), st.tuples(NUMBERS, NUMBERS, NUMBERS), st.tuples(*[st.floats(-0.1, 1.0)] * 3))
 def test_a_body_is_refused_exactly_if_its_pseudo_inertia_is_not_positive_definite(
     mass: float, com: tuple[float, float, float], inertia: tuple[float, float, float]
@@ -60,6 +63,7 @@ def test_reasons_why_a_body_cannot_be(mass: float, inertia: tuple[float, float, 
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
+@settings(deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_secretly_changed_bodies_can_be_and_stay_within_their_bounds(variant: str, seed: int) -> None:
     believed = load_robot(variant)
@@ -113,7 +117,7 @@ def test_what_the_postures_do_not_tell_is_the_priors(fit: ComIdentification) -> 
     # Where the mass of a hip motor lies along the yaw axis shows in no posture beside the trunk's; of a thigh, it does.
     assert body.told[place["left_hip_motor"], 3] < 0.01
     assert body.told[place["left_thigh"], 1] > 0.9
-    assert body.robot.link("left_hip_motor").com[2] == pytest.approx(ROBOT.link("left_hip_motor").com[2], abs=1e-3)
+    assert body.robot.link("left_hip_motor").com[2] == pytest.approx(ROBOT.link("left_hip_motor").com[2], abs=5e-3)
 
 
 def test_base_parameters_of_the_robot_file_give_back_the_robot_file(fit: ComIdentification) -> None:
@@ -124,16 +128,32 @@ def test_base_parameters_of_the_robot_file_give_back_the_robot_file(fit: ComIden
         assert link.com == pytest.approx(was.com, abs=1e-7)
 
 
-def test_masses_stay_positive_where_the_data_alone_would_make_one_negative(fit: ComIdentification) -> None:
-    index = fit.base.names.index("m c_z(head)")
-    lighter = standard_parameters(ROBOT)
-    neck = 4 * next(i for i, link in enumerate(ROBOT.links) if link.name == "neck")
-    lighter[neck : neck + 4] *= -0.5
-    lighter[:4] += standard_parameters(ROBOT)[neck : neck + 4] * 1.5
-    loose = replace(fit, values=fit.base.combinations @ lighter, covariance=fit.covariance * 100.0)
-    robot = most_probable_body(loose).robot
-    assert all(link.mass >= 0.999 * LIGHTEST * was.mass for link, was in zip(robot.links, ROBOT.links, strict=True))
-    assert fit.base.names[index] == "m c_z(head)"
+def _lighter_foot(fit: ComIdentification, mass: float) -> ComIdentification:
+    """Return an identification of the robot file with the left foot lighter by a mass [kg] and its moments the same."""
+    theta = standard_parameters(ROBOT)
+    theta[4 * [link.name for link in ROBOT.links].index("left_foot")] -= mass / ROBOT.mass
+    theta[0] += mass / ROBOT.mass
+    return replace(fit, values=fit.base.combinations @ theta, mass=ROBOT.mass)
+
+
+def test_no_link_becomes_lighter_than_allowed_and_the_base_parameters_still_fit(
+    fit: ComIdentification, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wanted = _lighter_foot(fit, 0.5)
+    light = most_probable_body(wanted).robot.link("left_foot").mass
+    least = 0.7 * ROBOT.link("left_foot").mass
+    assert light < least
+    monkeypatch.setattr(physical_consistency, "LIGHTEST", 0.7)
+    body = most_probable_body(wanted)
+    assert body.robot.link("left_foot").mass == pytest.approx(least)
+    assert body.misfit < chi2.ppf(0.5, len(fit.base.names) - 1)
+
+
+def test_base_parameters_that_put_a_com_far_off_its_link_are_refused(fit: ComIdentification) -> None:
+    with pytest.raises(
+        IdentificationError, match=r"put the CoM of left_shank \d\.\d\d m from where the robot file has it"
+    ):
+        most_probable_body(_lighter_foot(fit, 1.4))
 
 
 def test_base_parameters_that_no_positive_masses_have_are_refused(fit: ComIdentification) -> None:
@@ -142,6 +162,5 @@ def test_base_parameters_that_no_positive_masses_have_are_refused(fit: ComIdenti
         if "thigh" in link.name or "shank" in link.name:
             impossible[4 * index : 4 * index + 4] *= -3.0
     impossible[0] += 1.0 - impossible[::4].sum()
-    settings = IdentificationSettings()
     with pytest.raises(IdentificationError, match="no body with positive masses"):
-        most_probable_body(replace(fit, values=fit.base.combinations @ impossible, settings=settings))
+        most_probable_body(replace(fit, values=fit.base.combinations @ impossible))
