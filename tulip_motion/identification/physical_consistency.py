@@ -2,7 +2,7 @@
 
 Static postures tell only the base parameters theta_b = K theta (2c), 31 numbers of the playing robot's 71: sums of
 moments and masses along the legs. Gait and feedforward need masses, CoMs and inertias of all links. Of all bodies that
-fit, the most probable one is taken, by Bayes' rule with the robot file as prior, eq. (2d):
+fit, the most probable one is taken, by Bayes' rule with the robot file as prior, eq. (2e):
 
     z = argmin |z|^2 + |theta_b - K (mean + factor z)|^2 by the covariance of theta_b                         (2f)
     such that the masses are those that the cells weigh, in sum, and each at least LIGHTEST of the robot file's
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
+from tulip_description.body_file import Body, BodySource, links_of
 from tulip_description.pseudo_inertia import why_impossible
 from tulip_description.robot import Link, Robot, realizable_inertia
 from tulip_motion.identification.body_prior import body_prior
@@ -34,6 +35,9 @@ LIGHTEST = 0.1
 """Share of its mass in the robot file that a link keeps at least."""
 WEIGHED = 1e-6
 """Share of the whole mass to which the links' masses add up to it."""
+FARTHEST = 10.0
+"""Spreads of the CoM by which a link's may lie from where the robot file has it: a light link's moves most."""
+REMEDY = "else look for a cell or an encoder that is off"
 IMPROBABLE = 1e-6
 """Probability of base parameters, given the best body, below which no body is taken to have them."""
 
@@ -73,18 +77,31 @@ def most_probable_body(found: ComIdentification) -> WholeBody:
     sizes = np.diag(prior.factor)[::PER_BODY]
     lower[::PER_BODY] = (LIGHTEST - 1.0) * prior.mean[::PER_BODY] / sizes
     z = lsq_linear(
-        np.vstack((told, np.eye(count))), np.append(wanted, np.zeros(count)), bounds=(lower, np.inf), tol=1e-14
+        np.vstack((told, np.eye(count))), np.append(wanted, np.zeros(count)), bounds=(lower, np.inf), method="bvls"
     ).x
     misfit = float(np.sum((told @ z - wanted)[:-1] ** 2))
     if chi2.sf(misfit, len(combinations)) < IMPROBABLE:
         raise IdentificationError(
             f"no body with positive masses near the robot file's has the base parameters that were identified (chi^2"
             f" {misfit:.0f} for {len(combinations)}): state a larger spread of masses and CoMs if the robot was"
-            " rebuilt, else look for a cell or an encoder that is off"
+            f" rebuilt, {REMEDY}"
         )
-    theta = (prior.mean + prior.factor @ z).reshape(-1, PER_BODY) * found.mass
+    body = _with_bodies(robot, (prior.mean + prior.factor @ z).reshape(-1, PER_BODY) * found.mass)
+    for link, was in zip(body.links, robot.links, strict=True):
+        shift = float(np.linalg.norm(np.subtract(link.com, was.com)))
+        if shift > FARTHEST * found.settings.spread.com:
+            raise IdentificationError(
+                f"the base parameters that were identified put the CoM of {link.name} {shift:.2f} m from where the"
+                f" robot file has it: state a larger spread of CoMs if the robot was rebuilt, {REMEDY}"
+            )
     left = np.diag(np.linalg.inv(told.T @ told + np.eye(count)))
-    return WholeBody(_with_bodies(robot, theta), (1.0 - left).reshape(-1, PER_BODY), misfit)
+    return WholeBody(body, (1.0 - left).reshape(-1, PER_BODY), misfit)
+
+
+def as_body(found: ComIdentification, whole: WholeBody, source: BodySource) -> Body:
+    """Return what a body file keeps of an identification: the whole body, and the base parameters behind it."""
+    links = links_of(whole.robot.links)
+    return Body(found.prior.variant, source, links, found.base.names, found.values, found.covariance)
 
 
 def _with_bodies(robot: Robot, theta: Array) -> Robot:
