@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from tulip_description.robot import Robot
 from tulip_motion.identification.base_parameters import base_parameters
-from tulip_motion.identification.com_regressor import regressor_of, standard_parameters
+from tulip_motion.identification.body_comparison import base_values
+from tulip_motion.identification.com_regressor import regressor_of
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.static_measurement import StaticMeasurement
 
@@ -90,7 +91,7 @@ def validate(
         noise[here, here] = each.cop_covariance + model_error**2 * np.eye(2)
     measured = np.concatenate([each.cop for each in measurements])
     off = measured - known @ values
-    prior_off = measured - known @ (base.combinations @ standard_parameters(prior))
+    prior_off = measured - known @ base_values(prior)
     spread = noise + known @ covariance @ known.T + mount_spread**2 * mount @ mount.T
     nees = float(off @ np.linalg.solve(spread, off)) / len(off)
     low, high = scipy.stats.chi2.interval(SURE, len(off))
