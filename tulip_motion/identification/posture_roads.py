@@ -61,7 +61,7 @@ class RoadMap:
             solver: Of that foot.
             postures: All that a way may lead over.
         """
-        self._solver, self._postures = solver, tuple(postures)
+        self._solver, self.postures = solver, tuple(postures)
         places = np.array([posture.joint_positions for posture in postures])
         self.distances: Array = np.abs(places[:, None] - places[None]).max(axis=2)
         """(m, m) of the joint that moves farthest [rad]; infinite where a road turned out to be blocked."""
@@ -106,7 +106,7 @@ class RoadMap:
         """Return the straight road between two postures, or None, and block it, if the robot cannot take it."""
         known = self._roads.get((start, end))
         if known is None:
-            known = straight_road(self._solver, self._postures[start], self._postures[end])
+            known = straight_road(self._solver, self.postures[start], self.postures[end])
             if known is None:
                 self.distances[start, end] = self.distances[end, start] = np.inf
                 return None
