@@ -22,6 +22,7 @@ from tulip_motion.identification.static_measurement import StaticMeasurement
 Array = NDArray[np.float64]
 
 WINDOW = 5.0  # correlation times after which the sum of autocorrelations is cut: what follows is noise
+PARTS = 5  # of the time that is looked at
 LEAST_LOAD = 1.0  # [N] with less on a foot it has no CoP
 
 
@@ -30,14 +31,15 @@ class AveragingParameters:
     """When a robot is still, and how long it has to be."""
 
     duration: float = 1.2  # [s] of averaging
-    looked_at: float = 0.1  # [s] over which speeds are averaged, against the noise of one reading
-    turning: float = 0.010  # [rad/s] of the trunk at most; the gyro's bias is up to 0.005
-    joint_speed: float = 0.02  # [rad/s] of each joint at most
+    looked_at: float = 0.5  # [s] before the present that count: half a period of the sway
+    turning: float = 0.008  # [rad/s] of the trunk in the mean, at most; the gyro's bias is up to 0.005
+    joint_speed: float = 0.01  # [rad/s] of each joint in the mean, at most
+    cop_range: float = 0.0012  # [m] between the CoPs of a fifth of that time each; what accelerates moves the CoP most
     least_readings: int = 50
 
 
 class StillnessGate:
-    """Says whether the robot is still, by the mean speeds of the last moments."""
+    """Says whether the robot is still, by speeds and CoP of the last moments."""
 
     def __init__(self, parameters: AveragingParameters, period: float) -> None:
         """Begin without readings.
@@ -47,16 +49,29 @@ class StillnessGate:
             period: Between two readings [s].
         """
         self._parameters = parameters
-        self._rates: deque[Array] = deque(maxlen=max(1, round(parameters.looked_at / period)))
+        self._part = max(1, round(parameters.looked_at / PARTS / period))
+        self._readings: deque[Array] = deque(maxlen=PARTS * self._part)
 
-    def is_still(self, sensors: Sensors) -> bool:
-        """Take a reading and return whether the robot has been still for the time that is looked at."""
-        self._rates.append(np.concatenate([sensors.imu_angular_velocity, sensors.joint_velocities]))
-        if len(self._rates) < (self._rates.maxlen or 1):
+    @property
+    def cop(self) -> Array:
+        """(2,) mean CoP of the last moments [m]."""
+        mean: Array = np.mean(self._readings, axis=0)[:2]
+        return mean
+
+    def is_still(self, sensors: Sensors, cop: Array) -> bool:
+        """Take a reading and return whether the robot has been still for the time that is looked at.
+
+        Args:
+            sensors: The reading.
+            cop: (2,) centre of pressure [m].
+        """
+        self._readings.append(np.concatenate([cop, sensors.imu_angular_velocity, sensors.joint_velocities]))
+        if len(self._readings) < PARTS * self._part:
             return False
-        speeds = np.abs(np.mean(self._rates, axis=0))
-        p = self._parameters
-        return bool(speeds[:3].max() < p.turning and speeds[3:].max() < p.joint_speed)
+        p, parts = self._parameters, np.array(self._readings).reshape(PARTS, self._part, -1).mean(axis=1)
+        speeds = np.abs(parts.mean(axis=0))
+        still = speeds[2:5].max() < p.turning and speeds[5:].max() < p.joint_speed
+        return bool(still and np.ptp(parts[:, :2], axis=0).max() < p.cop_range)
 
 
 class HoldAverage:

@@ -29,7 +29,7 @@ from tulip_motion.interface import Side
 from tulip_motion.mirrored_step import quintic
 
 Array = NDArray[np.float64]
-USUAL_SETTLING = 1.5  # [s] for the time that is left
+USUAL_SETTLING = 3.0  # [s] for the time that is left
 TURN_ROUND = 4.0  # [1/s] from full speed to a stop in 0.25 s
 
 
@@ -39,8 +39,7 @@ class ExperimentParameters:
 
     stand_time: float = 1.5  # [s] at the start, from how the robot stands to the standing posture
     unload_cop: float = 0.010  # [m] of the CoP from its aim at most before the foot lifts
-    settle_cop: float = 0.004  # [m] before averaging begins
-    settle_time: float = 0.6  # [s] at least
+    settle_cop: float = 0.002  # [m] before averaging begins
     pace: Pace = field(default_factory=Pace)
     averaging: AveragingParameters = field(default_factory=AveragingParameters)
     balance: OneFootParameters = field(default_factory=OneFootParameters)
@@ -103,7 +102,6 @@ class Experiment:
         self._robot, self._period = robot, p.balance.control_period
         self._control = OneFootControl(robot, p.balance)
         self._watch = Watch(robot, p.safety, self._period)
-        self._gate = StillnessGate(p.averaging, self._period)
         self._postures = sum(len(plan.visits) for plan in plans)
         self._ahead: deque[Passage] = deque(passages(plans, p.pace))
         self._now: Passage = STANDING
@@ -111,6 +109,7 @@ class Experiment:
         self._speed = 1.0  # of that time: negative on the way back along a road
         self._turning_round = False
         self._here: Array | None = None  # where the last road has led
+        self._gate = StillnessGate(p.averaging, self._period)
         self._average: HoldAverage | None = None
         self._averaging_since = 0
         self._left_out: list[int] = []
@@ -179,9 +178,8 @@ class Experiment:
             self.abort(fault)
         if share == ALONE and self._average is None:
             control.correct(now.stance)
-        still = self._gate.is_still(sensors)
         if self._now.doing is Doing.HOLD:
-            self._hold(sensors, still)
+            self._hold(sensors)
         self._pass_time()
         return command
 
@@ -202,13 +200,13 @@ class Experiment:
             return share, self._here, np.zeros(len(self._here))
         return share, now.road.position(progress), self._speed * rate * now.road.rate(progress)
 
-    def _hold(self, sensors: Sensors, still: bool) -> None:
+    def _hold(self, sensors: Sensors) -> None:
         """Average once the robot is still, anew if it has moved meanwhile, and go on."""
         p, now = self._parameters, self._now
         side = SIDES[now.stance]
-        error = float(np.abs(self._control.cop_error(now.stance)).max())
+        still = self._gate.is_still(sensors, self._control.body.cop)
         if self._average is None:
-            if still and error < p.settle_cop and self._elapsed >= p.settle_time:
+            if still and np.abs(self._gate.cop - self._control.aims[now.stance]).max() < p.settle_cop:
                 self._average = HoldAverage(self._robot, "left" if side == "left" else "right")
                 self._averaging_since = sensors.stamp
             elif self._elapsed >= now.time:
@@ -225,14 +223,14 @@ class Experiment:
 
     def _pass_time(self) -> None:
         """Go on along the present passage, and over to the next one at its end."""
-        now = self._now
+        now, control = self._now, self._control
         if self._turning_round:
             self._speed = max(-1.0, self._speed - TURN_ROUND * self._period)
         self._elapsed += self._speed * self._period
         if self._elapsed <= 0.0 and self._turning_round:
             self._go_back()
         elif now.doing is Doing.UNLOAD:
-            error = float(np.abs(self._control.cop_error(now.stance)).max())
+            error = float(np.abs(control.aims[now.stance] - control.body.cop).max())
             if error < self._parameters.unload_cop or self._elapsed >= now.time:
                 self._begin_next()
         elif now.doing is not Doing.HOLD and self._elapsed >= now.time and self._ahead:
@@ -251,6 +249,7 @@ class Experiment:
             self._here = now.road.position(quintic(self._elapsed, now.time)[0])
         self._now = self._ahead.popleft()
         self._elapsed, self._speed, self._turning_round, self._average = 0.0, 1.0, False, None
+        self._gate = StillnessGate(self._parameters.averaging, self._period)
 
     @staticmethod
     def _usual_time(passage: Passage) -> float:

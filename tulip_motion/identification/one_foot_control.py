@@ -99,7 +99,8 @@ class OneFootControl:
         self._parameters = parameters or OneFootParameters()
         self.body = BodyOnFeet(robot)
         self._names = robot.joint_names
-        self._aims = tuple(aim_point(robot, side) for side in ("left", "right"))
+        self.aims = (aim_point(robot, "left"), aim_point(robot, "right"))
+        """(2,) where the CoP shall be on the left and the right foot while it stands alone, in its sole frame [m]."""
         self._gains = JointGains(MotionParameters())
         head = HeadParameters()
         self._head_gains = (np.full(2, head.stiffness), np.full(2, head.damping))
@@ -109,15 +110,10 @@ class OneFootControl:
         self.correction = np.zeros((2, 2))
         """Of the left and right ankle's pitch and roll while that foot carries all [rad]."""
 
-    def cop_error(self, stance: Side) -> Array:
-        """Return (2,) from the CoP as last measured to its aim on the stance foot [m]."""
-        error: Array = self._aims[stance] - self.body.cop
-        return error
-
     def correct(self, stance: Side) -> None:
         """Turn the stance ankle a little so that the CoP comes nearer to its aim."""
         p = self._parameters
-        ahead, left = self.cop_error(stance) * p.cop_gain * p.control_period / p.pendulum_height
+        ahead, left = (self.aims[stance] - self.body.cop) * p.cop_gain * p.control_period / p.pendulum_height
         # A foot that turns toes down against the shank takes the body back; soles up inside, to the left.
         turned = self.correction[stance] + (-ahead, left)
         self.correction[stance] = np.clip(turned, -p.most_correction, p.most_correction)
@@ -168,7 +164,7 @@ class OneFootControl:
         kinematics = self.body.kinematics
         right_share = share if stance is Side.RIGHT else 1.0 - share
         soles = [kinematics.data.oMf[frame] for frame in kinematics.sole_frames]
-        left, right = (sole.act(np.array((*aim, 0.0))) for sole, aim in zip(soles, self._aims, strict=True))
+        left, right = (sole.act(np.array((*aim, 0.0))) for sole, aim in zip(soles, self.aims, strict=True))
         return feedforward(kinematics, inverse_dynamics(kinematics, AT_REST, AT_REST), right_share, (left, right))
 
     def _send(self, sensors: Sensors, *values: Array) -> JointCommand:
