@@ -178,6 +178,8 @@ class Experiment:
             self.abort(fault)
         if share == ALONE and self._average is None:
             control.correct(now.stance)
+        else:
+            control.rest()
         if self._now.doing is Doing.HOLD:
             self._hold(sensors)
         self._pass_time()

@@ -2,7 +2,8 @@
 
 Feedforward is eq. (14) with gravity alone, at the joints as measured, and feedback eq. (13) with the gains of the open
 loop gait. As the robot's CoM is not known yet, that leaves the CoP off its aim; so the ankle of the stance leg turns,
-slowly, until the *measured* CoP is there. The ankle also damps the sway by the gyro.
+slowly, until the *measured* CoP is there. The ankle also damps the sway of the CoM, as the encoders show it: unlike
+the gyro's, that does not feed the swinging of the trunk against the leg.
 """
 
 from __future__ import annotations
@@ -35,10 +36,12 @@ class OneFootParameters:
     """Balance while postures are held."""
 
     control_period: float = 0.004  # [s] one tick of the driver
-    cop_gain: float = 0.4  # [1/s] of the CoP's error that the ankle takes away; at 0.8 it feeds the sway of 1 Hz
+    cop_gain: float = 0.5  # [1/s] of the CoP's error that the ankle takes away
+    cop_smoothing: float = 0.5  # [s] of the CoP before that: the sway of 1 Hz, which moves it most, is not to be fed
     pendulum_height: float = 0.67  # [m] of the CoM above the ankle: 1 mrad there moves the CoP by so many mm
     most_correction: float = 0.08  # [rad] of each ankle axis: a CoM that is off by 50 mm
-    sway_damping: float = 25.0  # [N m s/rad] a sixth of critical for 12 kg m^2 on 600 N m/rad; 70 shakes the hips
+    sway_damping: float = 70.0  # [N m s/rad] half of critical for 12 kg m^2 on 600 N m/rad
+    sway_smoothing: float = 0.05  # [s] of the CoM's velocity; encoders of 1e-4 rad make 1 mm/s then
 
 
 class BodyOnFeet:
@@ -47,12 +50,17 @@ class BodyOnFeet:
     Attributes:
         loads: On the left and right foot [N].
         cop: (2,) centre of pressure of both feet together, in the stance sole's frame [m].
-        turning: (3,) angular velocity of the trunk [rad/s].
+        com_velocity: (2,) of the CoM as it is believed to be, by the encoders [m/s].
         up: (3,) the stance sole's normal in base_link, which is up if that sole lies level.
     """
 
-    def __init__(self, robot: Robot) -> None:
-        """Make the model of the legs; the head is light and counts as looking straight ahead."""
+    def __init__(self, robot: Robot, smoothing: float) -> None:
+        """Make the model of the legs; the head is light and counts as looking straight ahead.
+
+        Args:
+            robot: As it is believed to be.
+            smoothing: Share of the newest reading in the CoM's velocity.
+        """
         model = floating_model(with_fixed_head(robot))
         p = MotionParameters()
         self.kinematics = InverseKinematics(
@@ -61,7 +69,9 @@ class BodyOnFeet:
         self._cells = np.array([np.hstack([foot.cells, np.zeros((4, 1))]) for foot in robot.feet])
         self.loads = np.zeros(2)
         self.cop = np.zeros(2)
-        self.turning = np.zeros(3)
+        self.com_velocity = np.zeros(2)
+        self._smoothing = smoothing
+        self._last: tuple[Side, int, Array] | None = None
         self.up = np.array([0.0, 0.0, 1.0])
 
     def update(self, sensors: Sensors, stance: Side) -> None:
@@ -78,12 +88,14 @@ class BodyOnFeet:
         places = [cells @ sole.rotation.T + sole.translation for cells, sole in zip(self._cells, soles, strict=True)]
         total = max(float(self.loads.sum()), 1.0)
         self.cop = np.einsum("sc,scx->x", sensors.foot_cells, np.array(places))[:2] / total
-        self.turning, self.up = base.rotation @ sensors.imu_angular_velocity, base.rotation[2]
-
-    def trunk_turning(self, stance: Side, joint_velocities: Array) -> Array:
-        """Return (3,) the trunk's angular velocity that (n,) joint velocities make while the stance sole rests."""
-        turning: Array = -self.kinematics.leg_twists[stance][3:] @ joint_velocities[:12][LEG_COLUMNS[stance]]
-        return turning
+        self.up = base.rotation[2]
+        com = data.com[0][:2].copy()
+        if self._last is None or self._last[0] is not stance:
+            self.com_velocity = np.zeros(2)
+        elif sensors.stamp > self._last[1]:
+            velocity = (com - self._last[2]) / ((sensors.stamp - self._last[1]) * 1e-9)
+            self.com_velocity = self.com_velocity + self._smoothing * (velocity - self.com_velocity)
+        self._last = (stance, sensors.stamp, com)
 
 
 class OneFootControl:
@@ -96,8 +108,8 @@ class OneFootControl:
             robot: As it is believed to be.
             parameters: Of balance.
         """
-        self._parameters = parameters or OneFootParameters()
-        self.body = BodyOnFeet(robot)
+        p = self._parameters = parameters or OneFootParameters()
+        self.body = BodyOnFeet(robot, p.control_period / p.sway_smoothing)
         self._names = robot.joint_names
         self.aims = (aim_point(robot, "left"), aim_point(robot, "right"))
         """(2,) where the CoP shall be on the left and the right foot while it stands alone, in its sole frame [m]."""
@@ -107,16 +119,24 @@ class OneFootControl:
         self._limits = robot.effort_limits[:12]
         self._low, self._high = robot.position_limits
         self._sequence = 0
+        self._smooth_cop: Array | None = None
         self.correction = np.zeros((2, 2))
         """Of the left and right ankle's pitch and roll while that foot carries all [rad]."""
 
     def correct(self, stance: Side) -> None:
         """Turn the stance ankle a little so that the CoP comes nearer to its aim."""
         p = self._parameters
-        ahead, left = (self.aims[stance] - self.body.cop) * p.cop_gain * p.control_period / p.pendulum_height
+        if self._smooth_cop is None:
+            self._smooth_cop = self.body.cop
+        self._smooth_cop = self._smooth_cop + p.control_period / p.cop_smoothing * (self.body.cop - self._smooth_cop)
+        ahead, left = (self.aims[stance] - self._smooth_cop) * p.cop_gain * p.control_period / p.pendulum_height
         # A foot that turns toes down against the shank takes the body back; soles up inside, to the left.
         turned = self.correction[stance] + (-ahead, left)
         self.correction[stance] = np.clip(turned, -p.most_correction, p.most_correction)
+
+    def rest(self) -> None:
+        """Leave the correction as it is; a later one begins with the CoP of then."""
+        self._smooth_cop = None
 
     def command(
         self, sensors: Sensors, stance: Side, share: float, positions: Array, velocities: Array
@@ -137,9 +157,10 @@ class OneFootControl:
         wanted[ankle] += alone * self.correction[stance]
         torques = np.zeros(len(wanted))
         torques[:12] = self._gravity(stance, share)
-        sway = body.turning - body.trunk_turning(stance, velocities)
-        # On a foot that rests, an ankle torque acts on the body the other way round.
-        torques[ankle] += alone * p.sway_damping * np.array([sway[1], sway[0]])
+        if share >= 1.0:  # else the CoM is on its way to that foot
+            sway = p.sway_damping / p.pendulum_height * body.com_velocity
+            # On a foot that rests, an ankle torque acts on the body the other way round.
+            torques[ankle] += (sway[0], -sway[1])
         torques[:12] = np.clip(torques[:12], -self._limits, self._limits)
         support = (Support.LEFT, Support.RIGHT)[stance] if share >= 1.0 else Support.DOUBLE
         stiffness, damping = self._gains.of(support, open_loop=True)
