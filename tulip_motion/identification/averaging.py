@@ -32,9 +32,9 @@ class AveragingParameters:
 
     duration: float = 1.2  # [s] of averaging
     looked_at: float = 0.5  # [s] before the present that count: half a period of the sway
-    turning: float = 0.008  # [rad/s] of the trunk in the mean, at most; the gyro's bias is up to 0.005
     joint_speed: float = 0.01  # [rad/s] of each joint in the mean, at most
-    cop_range: float = 0.0012  # [m] between the CoPs of a fifth of that time each; what accelerates moves the CoP most
+    cop_range: float = 0.0012  # [m] between the means of a fifth of that time each; what accelerates moves the CoP most
+    turning_range: float = 0.010  # [rad/s] between such means of the trunk's rate, whose bias is not known
     least_readings: int = 50
 
 
@@ -69,9 +69,9 @@ class StillnessGate:
         if len(self._readings) < PARTS * self._part:
             return False
         p, parts = self._parameters, np.array(self._readings).reshape(PARTS, self._part, -1).mean(axis=1)
-        speeds = np.abs(parts.mean(axis=0))
-        still = speeds[2:5].max() < p.turning and speeds[5:].max() < p.joint_speed
-        return bool(still and np.ptp(parts[:, :2], axis=0).max() < p.cop_range)
+        ranges = np.ptp(parts[:, :5], axis=0)
+        still = np.abs(parts[:, 5:].mean(axis=0)).max() < p.joint_speed
+        return bool(still and ranges[:2].max() < p.cop_range and ranges[2:].max() < p.turning_range)
 
 
 class HoldAverage:

@@ -39,7 +39,7 @@ class ExperimentParameters:
 
     stand_time: float = 1.5  # [s] at the start, from how the robot stands to the standing posture
     unload_cop: float = 0.010  # [m] of the CoP from its aim at most before the foot lifts
-    settle_cop: float = 0.002  # [m] before averaging begins
+    settle_cop: float = 0.0015  # [m] before averaging begins
     pace: Pace = field(default_factory=Pace)
     averaging: AveragingParameters = field(default_factory=AveragingParameters)
     balance: OneFootParameters = field(default_factory=OneFootParameters)

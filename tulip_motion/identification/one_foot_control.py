@@ -36,7 +36,7 @@ class OneFootParameters:
     """Balance while postures are held."""
 
     control_period: float = 0.004  # [s] one tick of the driver
-    cop_gain: float = 0.5  # [1/s] of the CoP's error that the ankle takes away
+    cop_gain: float = 0.8  # [1/s] of the CoP's error that the ankle takes away
     cop_smoothing: float = 0.5  # [s] of the CoP before that: the sway of 1 Hz, which moves it most, is not to be fed
     pendulum_height: float = 0.67  # [m] of the CoM above the ankle: 1 mrad there moves the CoP by so many mm
     most_correction: float = 0.08  # [rad] of each ankle axis: a CoM that is off by 50 mm
@@ -70,6 +70,7 @@ class BodyOnFeet:
         self.loads = np.zeros(2)
         self.cop = np.zeros(2)
         self.com_velocity = np.zeros(2)
+        self._contact_force = p.contact_force
         self._smoothing = smoothing
         self._last: tuple[Side, int, Array] | None = None
         self.up = np.array([0.0, 0.0, 1.0])
@@ -86,8 +87,9 @@ class BodyOnFeet:
         self.loads = sensors.foot_cells.sum(axis=1)
         soles = [data.oMf[frame] for frame in kinematics.sole_frames]
         places = [cells @ sole.rotation.T + sole.translation for cells, sole in zip(self._cells, soles, strict=True)]
-        total = max(float(self.loads.sum()), 1.0)
-        self.cop = np.einsum("sc,scx->x", sensors.foot_cells, np.array(places))[:2] / total
+        # The noise of cells in the air would count far away from the stance foot.
+        cells = np.where(self.loads > self._contact_force, sensors.foot_cells.T, 0.0).T
+        self.cop = np.einsum("sc,scx->x", cells, np.array(places))[:2] / max(float(cells.sum()), 1.0)
         self.up = base.rotation[2]
         com = data.com[0][:2].copy()
         if self._last is None or self._last[0] is not stance:
