@@ -1,8 +1,8 @@
 """The experiment of section 2: hold static postures on one foot, then on the other, and average the sensors.
 
 A state machine like `tulip_motion.motion.Motion`: each tick turns one reading of the sensors into one command, here for
-all joints, the head's too. Whatever `Watch` finds, and `abort`, makes the robot turn round on the road that it is on, go
-home over the plan's roads, put the foot down and stand; a robot that falls goes limp.
+all joints, the head's too. Whatever `Watch` finds, and `abort`, makes the robot turn round on the road that it is on,
+go home over the plan's roads, put the foot down and stand; a robot that falls goes limp.
 """
 
 from __future__ import annotations
@@ -88,9 +88,7 @@ class Progress(NamedTuple):
 class Experiment:
     """Drives the robot through the postures of a plan and collects what the sensors tell."""
 
-    def __init__(
-        self, robot: Robot, plans: Sequence[FootPlan], parameters: ExperimentParameters | None = None
-    ) -> None:
+    def __init__(self, robot: Robot, plans: Sequence[FootPlan], parameters: ExperimentParameters | None = None) -> None:
         """Begin; the robot stands on both feet.
 
         Args:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 
@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 
 from tulip_description.model import Side
 from tulip_description.robot import SIDES, Robot
-from tulip_motion.identification.posture_choice import choose
+from tulip_motion.identification.posture_choice import choose, rows_of
 from tulip_motion.identification.posture_roads import Road, RoadMap
 from tulip_motion.identification.static_postures import PostureParameters, PostureSolver, StaticPosture
 from tulip_motion.identification.weight_shift import WeightShift, weight_shift
 
 Array = NDArray[np.float64]
-Rows = Callable[[Sequence[StaticPosture]], Array]
-"""Gives (m, 2, n), the rows W of eq. (2) of m postures on one foot."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,6 @@ class FootPlan:
 
 def make_plan(
     robot: Robot,
-    rows: Rows,
     parameters: PlanParameters | None = None,
     postures: PostureParameters | None = None,
     advance: Callable[[], None] = lambda: None,
@@ -71,7 +68,6 @@ def make_plan(
 
     Args:
         robot: As it is believed to be.
-        rows: The regressor that the choice is made for.
         parameters: How much is planned.
         postures: What postures have to keep to.
         advance: Told after each of the two feet.
@@ -80,36 +76,49 @@ def make_plan(
         ValueError: if the robot cannot stand on a foot, or a posture cannot be reached.
     """
     p = parameters or PlanParameters()
-    seeds = np.random.default_rng(p.seed).spawn(len(SIDES))
-    plans = []
-    for name, rng in zip(SIDES, seeds, strict=True):
+    rng = np.random.default_rng(p.seed)
+    shifts, maps = [], []
+    for name in SIDES:
         side: Side = "left" if name == "left" else "right"
-        plans.append(_plan_foot(PostureSolver(robot, side, postures), rows, p, rng))
+        shift = weight_shift(robot, side)
+        shifts.append(shift)
+        maps.append(_road_map(PostureSolver(robot, side, postures), shift.lift.points[-1], p.candidates, rng))
         advance()
+    candidates = [
+        (side, stop) for side, roads in zip(SIDES, maps, strict=True) for stop in range(1, len(roads.postures))
+    ]
+    of_candidates = [maps[SIDES.index(side)].postures[stop] for side, stop in candidates]
+    chosen = choose(rows_of(robot, of_candidates), [side for side, _ in candidates], p.postures, rng)
+    plans = []
+    for side, shift, roads in zip(SIDES, shifts, maps, strict=True):
+        stops = [stop for of_side, stop in (candidates[index] for index in chosen) if of_side == side]
+        plans.append(FootPlan(roads.postures[0].side, shift, tuple(_visits(roads, stops))))
     return tuple(plans)
 
 
-def _plan_foot(solver: PostureSolver, rows: Rows, p: PlanParameters, rng: np.random.Generator) -> FootPlan:
-    shift = weight_shift(solver.robot, solver.side)
-    lifted = shift.lift.points[-1]
-    home = StaticPosture(solver.side, solver.coordinates_of(lifted), lifted)
+def _road_map(solver: PostureSolver, lifted: Array, candidates: int, rng: np.random.Generator) -> RoadMap:
+    """Return the road map of random postures that can be reached from the lifted foot, which is the first.
+
+    Args:
+        solver: Of the stance foot.
+        lifted: (n,) joints with the other foot lifted [rad].
+        candidates: How many postures are drawn.
+        rng: Draws them.
+    """
     fault = solver.fault(lifted)
     if fault:
-        raise ValueError(f"on the {solver.side} foot with the other lifted, {fault}")
-    reachable = _reachable(solver, [home, *islice(solver.samples(rng, lifted), p.candidates)])
-    chosen = [index + 1 for index in choose(rows(reachable.postures[1:]), p.postures, rng)]
-    visits, before = [], 0
-    for stop in reachable.tour(chosen, 0):
-        roads, back = reachable.way(before, stop), reachable.way(stop, 0)
-        if roads is None or back is None:
-            raise ValueError(f"posture {stop} on the {solver.side} foot cannot be reached; expected an open way")
-        visits.append(Visit(reachable.postures[stop], tuple(roads), tuple(back)))
-        before = stop
-    return FootPlan(solver.side, shift, tuple(visits))
-
-
-def _reachable(solver: PostureSolver, postures: list[StaticPosture]) -> RoadMap:
-    """Return the road map of the postures that can be reached from the first over the others."""
+        raise ValueError(f"on the {solver.side} foot with the other lifted, {fault}; expected a posture to begin with")
+    home = StaticPosture(solver.side, solver.coordinates_of(lifted), lifted)
+    postures = [home, *islice(solver.samples(rng, lifted), candidates)]
     roads = RoadMap(solver, postures)
-    found = [posture for index, posture in enumerate(postures) if roads.way(index, 0) is not None]
-    return RoadMap(solver, found)
+    return RoadMap(solver, [each for index, each in enumerate(postures) if roads.way(index, 0) is not None])
+
+
+def _visits(roads: RoadMap, stops: list[int]) -> Iterator[Visit]:
+    """Yield the stops in a short order, with the ways to them and home."""
+    before = 0
+    for stop in roads.tour(stops, 0):
+        there, back = roads.way(before, stop), roads.way(stop, 0)
+        assert there is not None and back is not None  # all of this map can be reached
+        yield Visit(roads.postures[stop], tuple(there), tuple(back))
+        before = stop

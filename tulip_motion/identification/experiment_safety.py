@@ -77,9 +77,7 @@ class Watch:
         lasting = [kind for kind, ticks in self._lasting.items() if ticks >= self._ticks]
         return signs[lasting[0]] if lasting else ""
 
-    def _signs(
-        self, sensors: Sensors, body: BodyOnFeet, stance: Side, share: float, wanted: Array
-    ) -> dict[str, str]:
+    def _signs(self, sensors: Sensors, body: BodyOnFeet, stance: Side, share: float, wanted: Array) -> dict[str, str]:
         """Return what is wrong with one reading: the kind, and in words."""
         p, names, found = self._parameters, self._robot.joint_names, {}
         angles = sensors.joint_positions
@@ -108,4 +106,3 @@ class Watch:
             if room < p.edge:
                 found["edge"] = f"the CoP is {1e3 * room:.0f} mm from the edge of the sole"
         return found
-

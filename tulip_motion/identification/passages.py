@@ -1,10 +1,10 @@
-"""The experiment as a row of passages: onto one foot, from posture to posture, back onto both feet, and the other foot."""
+"""The experiment as a row of passages: onto one foot, from posture to posture, back onto both feet; the other foot."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import Enum
+from enum import StrEnum
 
 from tulip_motion.identification.experiment_plan import FootPlan
 from tulip_motion.identification.posture_roads import Road
@@ -14,7 +14,7 @@ QUINTIC_PEAK = 1.875  # greatest rate of a quintic by its mean
 BOTH, ALONE = 0.5, 1.0  # shares of the weight on the stance foot
 
 
-class Doing(str, Enum):
+class Doing(StrEnum):
     """What the robot does in a passage."""
 
     STAND = "stand"

@@ -9,6 +9,7 @@ et al. 1996) whose roads are looked at only when a way wants to use them (lazy: 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +79,7 @@ class RoadMap:
             while stops[-1] != start:
                 stops.append(int(before[stops[-1]]))
             stops.reverse()
-            roads = [self._road(a, b) for a, b in zip(stops, stops[1:], strict=False)]
+            roads = [self._road(a, b) for a, b in pairwise(stops)]
             found = [road for road in roads if road is not None]
             if len(found) == len(roads):
                 return found
