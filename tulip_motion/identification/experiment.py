@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_description.model import Side as SideName
 from tulip_description.posture import standing_posture
-from tulip_description.robot import SIDES, Robot
+from tulip_description.robot import Robot
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_motion.identification.averaging import AveragingParameters, HoldAverage, StillnessGate
 from tulip_motion.identification.experiment_plan import FootPlan
@@ -24,6 +24,7 @@ from tulip_motion.identification.experiment_safety import SafetyParameters, Watc
 from tulip_motion.identification.one_foot_control import OneFootControl, OneFootParameters
 from tulip_motion.identification.passages import ALONE, BOTH, STANDING, Doing, Pace, Passage, passages
 from tulip_motion.identification.posture_roads import Road
+from tulip_motion.identification.progress import Hold, Progress
 from tulip_motion.identification.static_measurement import StaticMeasurement
 from tulip_motion.interface import Side
 from tulip_motion.mirrored_step import quintic
@@ -44,45 +45,6 @@ class ExperimentParameters:
     averaging: AveragingParameters = field(default_factory=AveragingParameters)
     balance: OneFootParameters = field(default_factory=OneFootParameters)
     safety: SafetyParameters = field(default_factory=SafetyParameters)
-
-
-class Hold(NamedTuple):
-    """When a posture was held and averaged.
-
-    Attributes:
-        posture: Its number in the plan, from 0.
-        side: The stance foot.
-        begin, end: Stamps of the first and last reading that count [ns].
-    """
-
-    posture: int
-    side: str
-    begin: int
-    end: int
-
-
-class Progress(NamedTuple):
-    """How far the experiment has come.
-
-    Attributes:
-        doing: At present.
-        posture: Number of the posture that is next or held, from 0; -1 for none.
-        postures: How many the plan has.
-        held: How many were averaged.
-        left_out: Numbers of those at which the robot did not become still.
-        seconds_left: About [s].
-        reason: Why it was aborted, or "".
-        hold: The last that ended.
-    """
-
-    doing: Doing
-    posture: int
-    postures: int
-    held: int
-    left_out: tuple[int, ...]
-    seconds_left: float
-    reason: str
-    hold: Hold | None
 
 
 class Experiment:
@@ -137,6 +99,7 @@ class Experiment:
             0.0 if self.finished else max(0.0, left),
             self.reason,
             self.holds[-1] if self.holds else None,
+            self.finished,
         )
 
     def abort(self, reason: str) -> None:
@@ -203,11 +166,11 @@ class Experiment:
     def _hold(self, sensors: Sensors) -> None:
         """Average once the robot is still, anew if it has moved meanwhile, and go on."""
         p, now = self._parameters, self._now
-        side = SIDES[now.stance]
+        side: SideName = "left" if now.stance is Side.LEFT else "right"
         still = self._gate.is_still(sensors, self._control.body.cop)
         if self._average is None:
             if still and np.abs(self._gate.cop - self._control.aims[now.stance]).max() < p.settle_cop:
-                self._average = HoldAverage(self._robot, "left" if side == "left" else "right")
+                self._average = HoldAverage(self._robot, side)
                 self._averaging_since = sensors.stamp
             elif self._elapsed >= now.time:
                 self._left_out.append(now.posture)

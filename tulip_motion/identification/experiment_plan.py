@@ -90,8 +90,8 @@ def make_plan(
     of_candidates = [maps[SIDES.index(side)].postures[stop] for side, stop in candidates]
     chosen = choose(rows_of(robot, of_candidates), [side for side, _ in candidates], p.postures, rng)
     plans = []
-    for side, shift, roads in zip(SIDES, shifts, maps, strict=True):
-        stops = [stop for of_side, stop in (candidates[index] for index in chosen) if of_side == side]
+    for name, shift, roads in zip(SIDES, shifts, maps, strict=True):
+        stops = [stop for of_side, stop in (candidates[index] for index in chosen) if of_side == name]
         plans.append(FootPlan(roads.postures[0].side, shift, tuple(_visits(roads, stops))))
     return tuple(plans)
 

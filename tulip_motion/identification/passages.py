@@ -106,7 +106,7 @@ def _on_one_foot(plan: FootPlan, pace: Pace, number: int) -> Iterator[Passage]:
     yield Passage(Doing.SHIFT, stance, shift, pace.shift_time, (BOTH, ALONE), way_back=back[2:])
     yield Passage(Doing.UNLOAD, stance, None, pace.unload_patience, way_back=back[1:])
     yield Passage(Doing.LIFT, stance, lift, pace.lift_time, way_back=back[1:])
-    way_back = back
+    way_back: tuple[Passage, ...] = back
     for visit in plan.visits:
         for road in visit.roads:
             yield along(road, number, way_back)

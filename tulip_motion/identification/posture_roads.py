@@ -72,7 +72,7 @@ class RoadMap:
         """Return the roads of the shortest way from a posture to another, or None if none is open."""
         while True:
             graph = csgraph_from_dense(self.distances, null_value=np.inf)
-            _, before = dijkstra(graph, indices=start, return_predecessors=True)
+            _, before = dijkstra(graph, directed=True, indices=np.array(start), return_predecessors=True)
             if end != start and before[end] < 0:
                 return None
             stops = [end]

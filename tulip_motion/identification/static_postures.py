@@ -56,9 +56,10 @@ class PostureParameters:
     @property
     def ranges(self) -> Array:
         """(2, 12) lowest and highest coordinates with the left foot on the ground."""
-        names = ("lean_forward", "lean_left", "stance_yaw", "stance_knee", "swing_yaw", "swing_roll", "swing_pitch")
-        names += ("swing_knee", "swing_ankle_pitch", "swing_ankle_roll", "head_pan", "head_tilt")
-        return np.array([getattr(self, name) for name in names]).T
+        stance = (self.lean_forward, self.lean_left, self.stance_yaw, self.stance_knee)
+        swing = (self.swing_yaw, self.swing_roll, self.swing_pitch, self.swing_knee)
+        ankle = (self.swing_ankle_pitch, self.swing_ankle_roll)
+        return np.array([*stance, *swing, *ankle, self.head_pan, self.head_tilt]).T
 
 
 MIRROR = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
