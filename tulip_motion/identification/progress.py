@@ -1,4 +1,4 @@
-"""How far the experiment has come, and which readings count: what the recording of one has to say besides the sensors."""
+"""How far the experiment has come, and which readings count: what a recording of one says besides the sensors."""
 
 from __future__ import annotations
 
