@@ -93,7 +93,7 @@ class CompliantGround:
         for joint, corners in zip(self.joints, self._corners, strict=True):
             placement, motion = data.oMi[joint], data.v[joint]
             places.append(corners @ placement.rotation.T + placement.translation)
-            velocities.append((motion.linear + np.cross(motion.angular, corners)) @ placement.rotation.T)
+            velocities.append((motion.linear + corners @ pin.skew(motion.angular).T) @ placement.rotation.T)
         return np.concatenate(places), np.concatenate(velocities)
 
     def _normal(self, places: Array, velocities: Array) -> Array:

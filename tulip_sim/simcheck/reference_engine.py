@@ -102,12 +102,11 @@ class ReferenceEngine:
         if self._ground is not None:
             pin.forwardKinematics(model, data, q, v)
             places, forces = self._ground.forces(data)
-            moments = np.cross(places, forces)
             for side, joint in enumerate(self._ground.joints):
                 own = slice(4 * side, 4 * side + 4)
-                total = pin.Force(forces[own].sum(axis=0), moments[own].sum(axis=0))
+                total = _resultant(places[own], forces[own])
                 self._forces[joint] = data.oMi[joint].actInv(total)
-            wrench[:3], wrench[3:] = forces.sum(axis=0), moments.sum(axis=0)
+                wrench += total.vector
         acceleration = pin.aba(model, data, q, v, tau, self._forces).copy()
         x, y, z, w = q[3:7]
         half = 0.5 * v[3:6]
@@ -120,3 +119,10 @@ class ReferenceEngine:
             ]
         )
         return np.concatenate([rotation @ v[:3], turning, v[6:]]), acceleration, wrench
+
+
+def _resultant(places: Array, forces: Array) -> pin.Force:
+    """Return the sum of forces (k, 3) at places (k, 3), and of their moments about the origin."""
+    product = places.T @ forces  # sum of p f^T, whose antisymmetric part is the moment
+    moment = np.array([product[1, 2] - product[2, 1], product[2, 0] - product[0, 2], product[0, 1] - product[1, 0]])
+    return pin.Force(forces.sum(axis=0), moment)

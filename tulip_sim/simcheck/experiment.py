@@ -1,0 +1,100 @@
+"""What an experiment is, and how either engine carries it out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from tulip_description.model import floating_model
+from tulip_description.posture import standing_posture
+from tulip_description.robot import Robot
+from tulip_description.robot_io import JointCommand
+from tulip_sim.parameters import DriverParameters
+from tulip_sim.simcheck.bullet_engine import BulletEngine
+from tulip_sim.simcheck.compliant_ground import GroundParameters
+from tulip_sim.simcheck.engine import Engine, Recording, State, record
+from tulip_sim.simcheck.reference_engine import ReferenceEngine
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A robot, how it begins, and what is done to it.
+
+    Attributes:
+        robot: What is simulated.
+        state: At the start.
+        milliseconds: How long.
+        before: Called with the engine and the number of each millisecond before it passes: commands and pushes. Joints
+            that get no command hold the standing posture.
+        grounded: Whether it may come to the ground.
+    """
+
+    robot: Robot
+    state: State
+    milliseconds: int
+    before: Callable[[Engine, int], None]
+    grounded: bool
+
+    def simulate(self, substeps: int = 1) -> Recording:
+        """Carry it out in the simulator, with so many steps of physics a millisecond."""
+        engine = BulletEngine(self.robot, standing_posture(self.robot).joint_positions, substeps)
+        try:
+            return self._run(engine)
+        finally:
+            engine.close()
+
+    def compute(self, ground: GroundParameters | None = None, steps: int | None = None) -> Recording:
+        """Carry it out by Pinocchio's forward dynamics."""
+        soles = (ground or GroundParameters()) if self.grounded else None
+        return self._run(ReferenceEngine(self.robot, standing_posture(self.robot).joint_positions, soles, steps))
+
+    def _run(self, engine: Engine) -> Recording:
+        engine.set_state(self.state)
+        return record(engine, self.milliseconds, lambda now: self.before(engine, now))
+
+
+def command(
+    robot: Robot,
+    now: int,
+    names: tuple[str, ...],
+    position: Array,
+    velocity: Array | None = None,
+    stiffness: float = 1.0,
+) -> JointCommand:
+    """Return a command with the gains that hold the standing robot, times a factor; 0 is limp.
+
+    Args:
+        robot: Whose joints.
+        now: Millisecond of the experiment.
+        names: Of the n joints.
+        position: (n,) [rad].
+        velocity: (n,) [rad/s], by default 0.
+        stiffness: Factor on stiffness and damping.
+    """
+    p = DriverParameters()
+    gains = zip(
+        robot.joint_names,
+        (*p.hold_stiffness * 2, p.head_hold[0], p.head_hold[0]),
+        (*p.hold_damping * 2, p.head_hold[1], p.head_hold[1]),
+        strict=True,
+    )
+    of = {name: (kp, kd) for name, kp, kd in gains}
+    kp, kd = stiffness * np.array([of[name] for name in names]).T
+    zero = np.zeros(len(names))
+    return JointCommand(now + 1, 0, names, position, zero if velocity is None else velocity, zero, kp, kd)
+
+
+def on_ground(robot: Robot, joints: Array, sole: str, height: float) -> Array:
+    """Return (7 + n,) q with an upright trunk above map's origin and a sole so high above the ground [m]."""
+    model = floating_model(robot)
+    data = model.createData()
+    q = np.concatenate([[0, 0, 0, 0, 0, 0, 1], joints])
+    pin.framesForwardKinematics(model, data, q)
+    q[2] = height - data.oMf[model.getFrameId(sole)].translation[2]
+    return q
