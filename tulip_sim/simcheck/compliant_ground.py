@@ -20,11 +20,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class GroundParameters:
-    """Of one corner of a sole; there are four a foot."""
+    """Of one corner of a sole; there are four a foot.
 
-    stiffness: float = 2.0e5  # [N/m] 0.14 mm under the standing robot
-    damping: float = 600.0  # [N s/m] overdamped for the foot alone, about critical for the share of a leg
-    friction: float = 0.8  # as that of `WorldParameters.exact`
+    Attributes:
+        stiffness: [N/m].
+        damping: [N s/m].
+        friction: Coefficient; that of `WorldParameters.exact`.
+    """
+
+    stiffness: float
+    damping: float
+    friction: float = 0.8
+
+
+STIFF = GroundParameters(8.0e5, 1200.0)
+"""0.035 mm under the standing robot; much damping for the foot alone, about critical for a leg's share of the robot."""
+SOFT = GroundParameters(2.0e5, 600.0)
+"""Four times softer, with the same share of damping: what changes between the two is due to the ground's giving way."""
 
 
 class CompliantGround:

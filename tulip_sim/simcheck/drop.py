@@ -34,7 +34,7 @@ def drop(height: float) -> Experiment:
 
     state = State(on_ground(robot, joints, frames.LEFT_SOLE, height), np.zeros(6 + len(joints)))
     falling = math.sqrt(2.0 * height / GRAVITY)
-    return Experiment(robot, state, round(1e3 * falling) + AFTER, before, grounded=True)
+    return Experiment(robot, state, round(1e3 * falling) + AFTER, before)
 
 
 def one_leg_posture(robot: Robot) -> Array:

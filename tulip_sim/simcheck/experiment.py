@@ -18,6 +18,7 @@ from tulip_sim.simcheck.bullet_engine import BulletEngine
 from tulip_sim.simcheck.compliant_ground import GroundParameters
 from tulip_sim.simcheck.engine import Engine, Recording, State, record
 from tulip_sim.simcheck.reference_engine import ReferenceEngine
+from tulip_sim.simcheck.rigid_engine import RigidEngine
 
 Array = NDArray[np.float64]
 
@@ -32,14 +33,12 @@ class Experiment:
         milliseconds: How long.
         before: Called with the engine and the number of each millisecond before it passes: commands and pushes. Joints
             that get no command hold the standing posture.
-        grounded: Whether it may come to the ground.
     """
 
     robot: Robot
     state: State
     milliseconds: int
     before: Callable[[Engine, int], None]
-    grounded: bool
 
     def simulate(self, substeps: int = 1) -> Recording:
         """Carry it out in the simulator, with so many steps of physics a millisecond."""
@@ -49,10 +48,13 @@ class Experiment:
         finally:
             engine.close()
 
-    def compute(self, ground: GroundParameters | None = None, steps: int | None = None) -> Recording:
-        """Carry it out by Pinocchio's forward dynamics."""
-        soles = (ground or GroundParameters()) if self.grounded else None
-        return self._run(ReferenceEngine(self.robot, standing_posture(self.robot).joint_positions, soles, steps))
+    def compute(self, ground: GroundParameters | None = None) -> Recording:
+        """Carry it out by Pinocchio's forward dynamics, on the given ground."""
+        return self._run(ReferenceEngine(self.robot, standing_posture(self.robot).joint_positions, ground))
+
+    def collide(self) -> Recording:
+        """Carry it out by Pinocchio's impulse dynamics, with soles that stay flat."""
+        return self._run(RigidEngine(self.robot, standing_posture(self.robot).joint_positions))
 
     def _run(self, engine: Engine) -> Recording:
         engine.set_state(self.state)

@@ -30,4 +30,4 @@ def flight() -> Experiment:
     v = np.zeros(6 + len(joints))
     v[3:6] = TURN
     q = np.concatenate([[0.0, 0.0, HEIGHT, 0.0, 0.0, 0.0, 1.0], joints])
-    return Experiment(robot, State(q, v), DURATION, before, grounded=False)
+    return Experiment(robot, State(q, v), DURATION, before)

@@ -26,4 +26,4 @@ def standing_push(direction: str) -> Experiment:
             engine.push(PUSHES[direction], PULSE)
 
     state = State(on_ground(robot, joints, frames.LEFT_SOLE, 0.0), np.zeros(6 + len(joints)))
-    return Experiment(robot, state, DURATION, before, grounded=True)
+    return Experiment(robot, state, DURATION, before)

@@ -42,7 +42,7 @@ def swing(driven: bool) -> Experiment:
             engine.apply(command(robot, now, LEFT, start, stiffness=0.0))
 
     state = State(np.concatenate([[0.0, 0.0, HEIGHT, 0.0, 0.0, 0.0, 1.0], joints]), np.zeros(6 + len(joints)))
-    return Experiment(robot, state, DURATION, before, grounded=False)
+    return Experiment(robot, state, DURATION, before)
 
 
 def _held(robot: Robot) -> Robot:
