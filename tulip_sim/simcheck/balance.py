@@ -23,10 +23,17 @@ Array = NDArray[np.float64]
 class Balance(NamedTuple):
     """What a recording shows, at its T + 1 states.
 
+    One step of the simulator computes the velocity at its end first, and moves with it (semi-implicit Euler). A force f
+    then works f v+ h, while the kinetic energy grows by less, by f (v- + v+) h / 2: the step swallows dv^T D dv / 2 with
+    dv = v+ - v-. Of a constant force that is its work on the way a h^2 / 2 that the step goes too far; of an impact
+    it is just the energy that a plastic impact takes (Carnot).
+
     Attributes:
         com: (T + 1, 3) centre of mass in map [m].
         kinetic, potential: (T + 1,) [J].
         work: (T + 1,) done so far by joints and pushes [J].
+        fed: (T + 1,) power that the weight feeds in, without what a push takes out again [W].
+        swallowed: (T + 1,) sum of dv^T D dv / 2 over the milliseconds so far [J].
         momentum: (T + 1, 3) linear, in map [N s].
         spin: (T + 1, 3) angular about the CoM, in map [N m s].
         momentum_error: (T + 1, 3) change of momentum that weight, pushes and ground do not explain [N s].
@@ -37,6 +44,8 @@ class Balance(NamedTuple):
     kinetic: Array
     potential: Array
     work: Array
+    fed: Array
+    swallowed: Array
     momentum: Array
     spin: Array
     momentum_error: Array
@@ -57,15 +66,19 @@ def balance(robot: Robot, run: Recording) -> Balance:
     """
     model = floating_model(robot)
     data = model.createData()
-    rows = []
+    trunk_com, rows = np.array(robot.links[0].com), []
     for q, v in zip(run.q, run.v, strict=True):
         pin.computeCentroidalMomentum(model, data, q, v)
         h, com = data.hg, data.com[0].copy()
         kinetic = pin.computeKineticEnergy(model, data, q, v)
         potential = pin.computePotentialEnergy(model, data, q)
-        trunk = q[:3] + quaternion_matrix(q[3:7].tolist()) @ np.array(robot.links[0].com)
-        rows.append((com, kinetic, potential, h.linear.copy(), h.angular.copy(), trunk))
-    com, kinetic, potential, momentum, spin, trunk = (np.array(column) for column in zip(*rows, strict=True))
+        rotation = quaternion_matrix(q[3:7].tolist())
+        trunk = q[:3] + rotation @ trunk_com
+        trunk_speed = rotation @ (v[:3] + np.cross(v[3:6], trunk_com))
+        rows.append((com, kinetic, potential, h.linear.copy(), h.angular.copy(), trunk, trunk_speed))
+    com, kinetic, potential, momentum, spin, trunk, trunk_speed = (
+        np.array(column) for column in zip(*rows, strict=True)
+    )
     work = (run.efforts * np.diff(run.joints, axis=0)).sum(axis=1) + (run.push * np.diff(trunk, axis=0)).sum(axis=1)
     weight = np.array([0.0, 0.0, -GRAVITY * robot.mass])
     pushed = 1e-3 * run.push
@@ -77,11 +90,23 @@ def balance(robot: Robot, run: Recording) -> Balance:
         kinetic,
         potential,
         _sums(work),
+        (trunk_speed * np.concatenate([run.push, run.push[-1:]])).sum(axis=1) - GRAVITY * momentum[:, 2],
+        _sums(np.array([_swallowed(model, data, run, k) for k in range(len(run.efforts))])),
         momentum,
         spin,
         momentum - momentum[0] - _sums(given),
         spin - spin[0] - _sums(turned),
     )
+
+
+def _swallowed(model: pin.Model, data: pin.Data, run: Recording, k: int) -> float:
+    """Return the kinetic energy of the change of velocity in a millisecond [J]."""
+    turn = quaternion_matrix(run.q[k + 1, 3:7].tolist()).T @ quaternion_matrix(run.q[k, 3:7].tolist())
+    change = run.v[k + 1].copy()
+    change[:3] -= turn @ run.v[k, :3]
+    change[3:6] -= turn @ run.v[k, 3:6]
+    change[6:] -= run.v[k, 6:]
+    return float(pin.computeKineticEnergy(model, data, run.q[k + 1], change))
 
 
 def _sums(steps: Array) -> Array:

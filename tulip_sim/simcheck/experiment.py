@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tulip_description.model import floating_model
 from tulip_description.posture import standing_posture
-from tulip_description.robot import Robot
+from tulip_description.robot import Robot, load_robot
 from tulip_description.robot_io import JointCommand
 from tulip_sim.parameters import DriverParameters
 from tulip_sim.simcheck.bullet_engine import BulletEngine
@@ -32,7 +32,7 @@ class Experiment:
         state: At the start.
         milliseconds: How long.
         before: Called with the engine and the number of each millisecond before it passes: commands and pushes. Joints
-            that get no command hold the standing posture.
+            that get no command hold the standing posture of the playing robot.
     """
 
     robot: Robot
@@ -42,7 +42,7 @@ class Experiment:
 
     def simulate(self, substeps: int = 1) -> Recording:
         """Carry it out in the simulator, with so many steps of physics a millisecond."""
-        engine = BulletEngine(self.robot, standing_posture(self.robot).joint_positions, substeps)
+        engine = BulletEngine(self.robot, _standing(), substeps)
         try:
             return self._run(engine)
         finally:
@@ -50,15 +50,19 @@ class Experiment:
 
     def compute(self, ground: GroundParameters | None = None) -> Recording:
         """Carry it out by Pinocchio's forward dynamics, on the given ground."""
-        return self._run(ReferenceEngine(self.robot, standing_posture(self.robot).joint_positions, ground))
+        return self._run(ReferenceEngine(self.robot, _standing(), ground))
 
     def collide(self) -> Recording:
         """Carry it out by Pinocchio's impulse dynamics, with soles that stay flat."""
-        return self._run(RigidEngine(self.robot, standing_posture(self.robot).joint_positions))
+        return self._run(RigidEngine(self.robot, _standing()))
 
     def _run(self, engine: Engine) -> Recording:
         engine.set_state(self.state)
         return record(engine, self.milliseconds, lambda now: self.before(engine, now))
+
+
+def _standing() -> Array:
+    return standing_posture(load_robot()).joint_positions
 
 
 def command(
@@ -67,9 +71,8 @@ def command(
     names: tuple[str, ...],
     position: Array,
     velocity: Array | None = None,
-    stiffness: float = 1.0,
 ) -> JointCommand:
-    """Return a command with the gains that hold the standing robot, times a factor; 0 is limp.
+    """Return a command with the gains that hold the standing robot.
 
     Args:
         robot: Whose joints.
@@ -77,7 +80,6 @@ def command(
         names: Of the n joints.
         position: (n,) [rad].
         velocity: (n,) [rad/s], by default 0.
-        stiffness: Factor on stiffness and damping.
     """
     p = DriverParameters()
     gains = zip(
@@ -87,7 +89,7 @@ def command(
         strict=True,
     )
     of = {name: (kp, kd) for name, kp, kd in gains}
-    kp, kd = stiffness * np.array([of[name] for name in names]).T
+    kp, kd = np.array([of[name] for name in names]).T
     zero = np.zeros(len(names))
     return JointCommand(now + 1, 0, names, position, zero if velocity is None else velocity, zero, kp, kd)
 
