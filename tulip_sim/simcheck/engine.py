@@ -14,6 +14,8 @@ from tulip_description.robot_io import JointCommand
 
 Array = NDArray[np.float64]
 
+LEAST_LOAD = 1e-3  # [N s] with less there is no centre of pressure
+
 
 class State(NamedTuple):
     """A state of the floating robot, as `tulip_description.model.floating_model` writes it.
@@ -92,14 +94,13 @@ class Recording:
         """(T + 1, n) joint positions [rad]."""
         return self.q[:, 7:]
 
-    @property
-    def cop(self) -> Array:
-        """(T, 2) centre of pressure of both soles in map [m], as mean of a millisecond; nan without load."""
-        vertical = self.contact[:, 2]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            found = np.column_stack([-self.contact[:, 4], self.contact[:, 3]]) / vertical[:, None]
-        found[vertical < 1e-4] = np.nan  # 0.1 N
-        return found
+
+def centre_of_pressure(impulses: Array) -> Array:
+    """Return (T, 2) where on the ground impulses with their moments about the origin, (T, 6), act; nan without load."""
+    vertical = impulses[:, 2:3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found: Array = np.where(vertical > LEAST_LOAD, impulses[:, [4, 3]] * [-1.0, 1.0] / vertical, np.nan)
+    return found
 
 
 def record(engine: Engine, milliseconds: int, before: Callable[[int], None] | None = None) -> Recording:

@@ -16,7 +16,9 @@ HELD_MASS = 1.0e6  # [kg] of a trunk that the legs cannot move: the swing shifts
 HEIGHT = 3.0  # [m] of base_link: nothing touches the ground
 DURATION = 2000  # [ms]
 LEFT = LEG_JOINTS[:6]
-LOOSE = np.array([0.0, 1.0, 1.0, 0.0, 0.0, 0.0])  # hip roll and pitch; what hangs on them stays within the joints' ranges
+LOOSE = np.array(
+    [0.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+)  # hip roll and pitch; what hangs on them stays within the joints' ranges
 RAISED = np.array([0.0, 0.25, -0.6, 0.0, 0.0, 0.0])  # [rad] from where the loose leg is let go, beside standing
 STRIDES = np.array([0.0, 0.0, -0.35, 0.35, 0.1, 0.0])  # [rad] amplitudes of the driven leg
 RATE = 8.0  # [rad/s] of its swinging
