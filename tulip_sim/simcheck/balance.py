@@ -24,8 +24,8 @@ class Balance(NamedTuple):
     """What a recording shows, at its T + 1 states.
 
     One step of the simulator computes the velocity at its end first, and moves with it (semi-implicit Euler). A force f
-    then works f v+ h, while the kinetic energy grows by less, by f (v- + v+) h / 2: the step swallows dv^T D dv / 2 with
-    dv = v+ - v-. Of a constant force that is its work on the way a h^2 / 2 that the step goes too far; of an impact
+    then works f v+ h, while the kinetic energy grows by less, by f (v- + v+) h / 2: the step swallows dv^T D dv / 2,
+    dv = v+ - v-. For a constant force that is its work on the way a h^2 / 2 that the step goes too far; for an impact
     it is just the energy that a plastic impact takes (Carnot).
 
     Attributes:
@@ -53,9 +53,10 @@ class Balance(NamedTuple):
 
     @property
     def energy_error(self) -> Array:
-        """(T + 1,) change of energy that no work explains [J]: 0 in the air; on the ground at most 0, as it only takes."""
-        energy: Array = self.kinetic + self.potential
-        return energy - energy[0] - self.work
+        """(T + 1,) change of energy that no work explains [J]: 0 in the air, less where the ground takes energy."""
+        energy = self.kinetic + self.potential
+        error: Array = energy - energy[0] - self.work
+        return error
 
 
 def balance(robot: Robot, run: Recording) -> Balance:

@@ -102,10 +102,10 @@ class BulletEngine:
         """Return (6,) the ground's impulse in the last step of physics and its moment about the origin."""
         impulse = np.zeros(6)
         for point in pybullet.getContactPoints(self._simulated.body, self._carpet, physicsClientId=self._client):
-            place, normal, pressing, along_1, axis_1, along_2, axis_2 = (*point[6:8], *point[9:14])
-            force = np.array([normal, axis_1, axis_2]).T @ [pressing, along_1, along_2]
+            axes, sizes = np.array([point[7], point[11], point[13]]), np.array([point[9], point[10], point[12]])
+            force = sizes @ axes  # pressing, and friction both ways
             impulse[:3] += force
-            impulse[3:] += np.cross(place, force)
+            impulse[3:] += np.cross(point[6], force)
         return impulse * 1e-3 / self._substeps
 
     def _depth(self) -> float:

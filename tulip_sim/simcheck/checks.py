@@ -1,7 +1,7 @@
 """The bounds of the simulator's balances, and why they are what they are.
 
-pybullet solves for velocities once a step (semi-implicit Euler), so all its errors are of the first order of the step h.
-The bounds follow from that, not from what was measured; docs/simcheck.md has both.
+pybullet solves for velocities once a step (semi-implicit Euler), so all its errors are of the first order of the step
+h. The bounds follow from that; docs/simcheck.md has what was measured beside them.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ def in_air(b: Balance, substeps: int) -> list[Check]:
     """Return the checks of energy for a robot that nothing touches.
 
     Of a robot under its weight alone the step keeps not the energy E, but E + P h / 2 with P the power that the weight
-    feeds in: E goes to and fro with P. Torques swallow dv^T D dv / 2 a step; with k steps a millisecond that is 1 / k of
-    what `Balance` sums.
+    feeds in: E goes to and fro with P. Torques swallow dv^T D dv / 2 a step; with k steps a millisecond that is 1 / k
+    of what `Balance` sums.
     """
     shift = 0.5e-3 / substeps * float(np.ptp(b.fed))
     swallowed = float(b.swallowed[-1]) / substeps
@@ -56,8 +56,8 @@ def in_air(b: Balance, substeps: int) -> list[Check]:
 def on_ground(run: Recording, b: Balance, mass: float, speed: float, substeps: int) -> list[Check]:
     """Return the checks of energy and depth for a robot that comes to the ground with a speed [m/s].
 
-    The ground only takes energy, and plastic impacts take dv^T D dv / 2. But a sole sinks in while its corners are found,
-    and lifting the robot out of that depth costs its weight times the depth.
+    The ground only takes energy, and plastic impacts take dv^T D dv / 2. But a sole sinks in while its corners are
+    found, and lifting the robot out of that depth costs its weight times the depth.
     """
     error, depth, h = b.energy_error, max(float(run.depth.max()), 0.0), 1e-3 / substeps
     regained = float((error - np.minimum.accumulate(error)).max())

@@ -1,7 +1,7 @@
 """The ground as springs and dampers under the corners of the soles, with dry friction.
 
-pybullet's carpet is rigid: it solves for impulses that stop the corners. An ordinary differential equation needs a force
-as a function of the state; this one comes near to rigid ground as its stiffness grows.
+pybullet's carpet is rigid: it solves for impulses that stop the corners. An ordinary differential equation needs a
+force as a function of the state; this one comes near to rigid ground as its stiffness grows.
 """
 
 from __future__ import annotations

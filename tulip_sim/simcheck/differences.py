@@ -67,12 +67,11 @@ def smooth_cop(run: Recording) -> Array:
     return centre_of_pressure(blocks)
 
 
-def impulse(run: Recording, other: Recording, milliseconds: int, asked: bool = True) -> Difference:
-    """Return by how much the ground's vertical impulse of the first milliseconds differs."""
+def impulse(run: Recording, other: Recording, milliseconds: int | None = None) -> Difference:
+    """Return by how much the ground's vertical impulse differs, of the first milliseconds or of the whole run."""
     own, their = (float(each.contact[:milliseconds, 2].sum()) for each in (run, other))
-    return Difference(
-        f"impulse until {milliseconds} ms", "%", 100.0 * abs(own / their - 1.0), ASKED["impulse"] if asked else None
-    )
+    name = "impulse" if milliseconds is None else f"impulse until {milliseconds} ms"
+    return Difference(name, "%", 100.0 * abs(own / their - 1.0), ASKED["impulse"])
 
 
 def velocities(run: Recording, other: Recording, milliseconds: int) -> Difference:

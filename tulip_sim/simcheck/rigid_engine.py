@@ -1,9 +1,9 @@
 """The robot on rigid ground that takes whole soles, by `pin.impulseDynamics`, as an `Engine`.
 
-With J the Jacobian of the soles that the ground stops, D(q) (v+ - v-) = J^T p and J v+ = 0. A foot that would have to be
-pulled down (p_z < 0) leaves the ground instead, and is left out of J. Each small step lets weight and torques change the
-velocity, and then the ground (Moreau's time stepping). Soles can leave the ground and return, but not tilt, and do not
-slip: that has to be seen from the impulses.
+With J the Jacobian of the soles that the ground stops, D(q) (v+ - v-) = J^T p and J v+ = 0. A foot that would have to
+be pulled down (p_z < 0) leaves the ground instead, and is left out of J. Each small step lets weight and torques change
+the velocity, and then the ground (Moreau's time stepping). It is made for landings of flat feet: a sole on the ground
+neither tilts nor slips, however large the impulse that this takes.
 """
 
 from __future__ import annotations

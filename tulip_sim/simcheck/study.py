@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 from tulip_sim.bodies import GRAVITY
 from tulip_sim.simcheck import checks, differences
@@ -35,7 +36,7 @@ class Study:
 
     Attributes:
         experiment: What is done.
-        references: Other ways to compute it, by name.
+        references: Other ways to compute it, by name. What is asked is asked of the difference from the first.
         check: Returns the balances of a run with so many steps a millisecond, and their bounds.
         compare: Returns by how much a run differs from a reference.
     """
@@ -102,7 +103,7 @@ def _on_ground(
 
 
 def _springs(experiment: Experiment) -> dict[str, Callable[[], Recording]]:
-    return {"stiff ground": lambda: experiment.compute(STIFF), "soft ground": lambda: experiment.compute(SOFT)}
+    return {"stiff ground": partial(experiment.compute, STIFF), "soft ground": partial(experiment.compute, SOFT)}
 
 
 def _body(run: Run, other: Run) -> list[Difference]:
@@ -111,7 +112,7 @@ def _body(run: Run, other: Run) -> list[Difference]:
         differences.attitude(run.recording, other.recording),
         differences.com(run.balance, other.balance),
         differences.cop(run.recording, other.recording),
-        differences.impulse(run.recording, other.recording, len(run.recording.push)),
+        differences.impulse(run.recording, other.recording),
     ]
 
 
@@ -135,16 +136,19 @@ def _landing(speed: float) -> Study:
             *(differences.velocities(own, their, milliseconds) for milliseconds in (5, 20)),
         ]
 
-    references = {"rigid impact": experiment.collide, "stiff ground": lambda: experiment.compute(STIFF)}
+    references: dict[str, Callable[[], Recording]] = {
+        "rigid impact": experiment.collide,
+        "stiff ground": partial(experiment.compute, STIFF),
+    }
     return _on_ground(experiment, speed, references, compare)
 
 
 STUDIES: dict[str, Callable[[], Study]] = {
-    "leg swings, loose": lambda: _swing(driven=False),
-    "leg swings, driven": lambda: _swing(driven=True),
+    "leg swings, loose": partial(_swing, driven=False),
+    "leg swings, driven": partial(_swing, driven=True),
     "flight": _flight,
-    **{f"drop from {100 * height:.0f} cm": (lambda height=height: _drop(height)) for height in (0.01, 0.02, 0.03)},
-    **{f"standing, pushed {direction}": (lambda direction=direction: _push(direction)) for direction in PUSHES},
-    **{f"landing at {speed} m/s": (lambda speed=speed: _landing(speed)) for speed in (0.1, 0.2, 0.3, 0.5)},
+    **{f"drop from {100 * height:.0f} cm": partial(_drop, height) for height in (0.01, 0.02, 0.03)},
+    **{f"standing, pushed {direction}": partial(_push, direction) for direction in PUSHES},
+    **{f"landing at {speed} m/s": partial(_landing, speed) for speed in (0.1, 0.2, 0.3, 0.5)},
 }
 """All studies by name."""
