@@ -24,7 +24,7 @@ Make = Callable[[Study, Mapping[int, Run], Mapping[str, Run]], Curves]
 """Makes curves of a study from the simulator's runs, by steps a millisecond, and those of the references, by name."""
 
 POINTS = 250  # of a curve, about
-TOUCH = 78  # [ms] when what falls 3 cm touches the ground
+LANDED = slice(55, 115)  # [ms] around the moment when what falls 2 or 3 cm touches the ground: 64, 78 ms
 HIP = {"roll": JOINTS.index("left_hip_roll"), "pitch": JOINTS.index("left_hip_pitch")}
 STYLES: dict[str, dict[str, Any]] = {
     "pybullet": {"color": "tab:blue"},
@@ -80,12 +80,22 @@ def _apart(study: Study, runs: Mapping[int, Run], references: Mapping[str, Run])
 
 def _force(run: Run) -> Array:
     force: Array = 1e3 * run.recording.contact[:, 2]  # [N] from [N s] a millisecond
-    return force[TOUCH - 10 : TOUCH + 40]
+    return force[LANDED]
 
 
 def _spin_error(run: Run) -> Array:
     size: Array = np.linalg.norm(run.balance.spin_error, axis=1)
     return size
+
+
+def _ankle_roll(run: Run) -> Array:
+    angles = 1e3 * run.recording.joints[LANDED, JOINTS.index("left_ankle_roll")]
+    turned: Array = angles - angles[0]
+    return turned
+
+
+def _impulse(run: Run) -> Array:
+    return np.concatenate([[0.0], np.cumsum(run.recording.contact[:, 2])])
 
 
 def _curve(values: Array, spacing: int = 1, begin: int = 0) -> tuple[Array, Array]:
@@ -114,7 +124,7 @@ PANELS = (
         _by_step(lambda run: run.balance.energy_error, "energy from nowhere"),
     ),
     Panel("flight", "spin about the CoM that nothing explains", "[N m s]", _by_step(_spin_error, "spin about the CoM")),
-    Panel("drop from 3 cm", "force of the ground", "[N]", _by_engine(_force, begin=TOUCH - 10)),
+    Panel("drop from 3 cm", "force of the ground", "[N]", _by_engine(_force, begin=LANDED.start)),
     Panel("drop from 3 cm", "energy lost", "[J]", _by_engine(lambda run: -run.balance.energy_error)),
     Panel("standing, pushed left", "CoM to the left", "[mm]", _by_engine(lambda run: 1e3 * run.balance.com[:, 1])),
     Panel(
@@ -123,12 +133,9 @@ PANELS = (
         "[mm]",
         _by_engine(lambda run: 1e3 * smooth_cop(run.recording)[:, 1], SMOOTHING),
     ),
-    Panel(
-        "landing at 0.3 m/s",
-        "vertical impulse of the ground so far",
-        "[N s]",
-        _by_engine(lambda run: np.concatenate([[0.0], np.cumsum(run.recording.contact[:, 2])])),
-    ),
+    Panel("drop from 2 cm", "left ankle rolls", "[mrad]", _by_engine(_ankle_roll, begin=LANDED.start)),
+    Panel("landing at 0.3 m/s, loose", "vertical impulse of the ground so far", "[N s]", _by_engine(_impulse)),
+    Panel("landing at 0.3 m/s, driven", "vertical impulse of the ground so far", "[N s]", _by_engine(_impulse)),
 )
 
 

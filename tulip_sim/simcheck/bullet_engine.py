@@ -62,9 +62,8 @@ class BulletEngine:
         client, own = self._client, self._simulated
         rotation = quaternion_matrix(state.q[3:7].tolist())
         com = state.q[:3] + rotation @ self._com
-        linear = rotation @ (
-            state.v[:3] + np.cross(state.v[3:6], self._com)
-        )  # of the trunk's CoM, as pybullet wants it
+        # pybullet wants place and velocity of the trunk's CoM.
+        linear = rotation @ (state.v[:3] + np.cross(state.v[3:6], self._com))
         angular = rotation @ state.v[3:6]
         pybullet.resetBasePositionAndOrientation(own.body, com.tolist(), state.q[3:7].tolist(), physicsClientId=client)
         pybullet.resetBaseVelocity(own.body, linear.tolist(), angular.tolist(), physicsClientId=client)

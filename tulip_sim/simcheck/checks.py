@@ -14,12 +14,12 @@ from tulip_sim.bodies import GRAVITY
 from tulip_sim.simcheck.balance import Balance
 from tulip_sim.simcheck.engine import Recording
 
-MOMENTUM_SHARE = 1e-3  # of the weight's impulse: the order of h times the rate at which the legs swing, 1 ms * 10 / s,
-# times the legs' share of the momentum, a tenth
-SPIN_SHARE = 1e-2  # of the greatest spin: h times that rate
+# Joints move at rates of about 10 / s, so that a first-order error is 10 / s * 1 ms = 1 % of what they bring about.
+SPIN_SHARE = 1e-2  # of the greatest spin
+MOMENTUM_SHARE = 1e-3  # of the weight's impulse, of which the motion of the legs makes about a tenth
 MARGIN = 1.5  # on the energy of a step, of which the first order is bounded
-STEPS_TO_FOUR_CORNERS = 3  # pybullet finds one more corner of a sole that meets a plane with every step
-SLOP = 2e-5  # [m] twice the depth that pybullet leaves alone
+STEPS_TO_FOUR_CORNERS = 3  # as seen: pybullet finds one more corner of a sole that meets a plane with every step
+SLOP = 2e-5  # [m] twice the depth at which soles are seen to rest
 
 
 class Check(NamedTuple):

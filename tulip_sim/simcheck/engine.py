@@ -103,7 +103,7 @@ def centre_of_pressure(impulses: Array) -> Array:
     return found
 
 
-def record(engine: Engine, milliseconds: int, before: Callable[[int], None] | None = None) -> Recording:
+def record(engine: Engine, milliseconds: int, before: Callable[[int], None]) -> Recording:
     """Run an engine and keep everything.
 
     Args:
@@ -113,8 +113,7 @@ def record(engine: Engine, milliseconds: int, before: Callable[[int], None] | No
     """
     states, steps = [engine.state], []
     for now in range(milliseconds):
-        if before is not None:
-            before(now)
+        before(now)
         steps.append(engine.advance())
         states.append(engine.state)
     return Recording(

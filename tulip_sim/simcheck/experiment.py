@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tulip_description.model import floating_model
 from tulip_description.posture import standing_posture
@@ -92,6 +92,12 @@ def command(
     kp, kd = np.array([of[name] for name in names]).T
     zero = np.zeros(len(names))
     return JointCommand(now + 1, 0, names, position, zero if velocity is None else velocity, zero, kp, kd)
+
+
+def loosened(command: JointCommand, loose: ArrayLike) -> JointCommand:
+    """Return a command without stiffness and damping at the joints where loose, (n,) or for all, is 1."""
+    held = 1.0 - np.asarray(loose)
+    return replace(command, stiffness=held * command.stiffness, damping=held * command.damping)
 
 
 def on_ground(robot: Robot, joints: Array, sole: str, height: float) -> Array:

@@ -11,7 +11,7 @@ from tulip_description.model import floating_model
 from tulip_description.posture import standing_posture
 from tulip_description.robot import Robot, load_robot
 from tulip_sim.simcheck.engine import Engine, State
-from tulip_sim.simcheck.experiment import Experiment, command, on_ground
+from tulip_sim.simcheck.experiment import Experiment, command, loosened, on_ground
 from tulip_sim.simcheck.rigid_engine import sole_jacobian
 
 Array = NDArray[np.float64]
@@ -21,8 +21,13 @@ LEFT = slice(6, 12)  # of v
 STRIDE = 0.10  # [m] by which the landing foot is ahead
 
 
-def landing(speed: float) -> Experiment:
-    """Return the experiment: both soles on the ground, the left one coming down at a speed [m/s] by its leg alone."""
+def landing(speed: float, driven: bool) -> Experiment:
+    """Return the experiment: both soles at the ground, the left one coming down by its leg alone.
+
+    Args:
+        speed: Of the left sole [m/s].
+        driven: Whether the driver holds the posture, and so brakes the leg; else all joints are loose.
+    """
     robot = load_robot()
     model = floating_model(robot)
     q = _stride(robot, model)
@@ -31,7 +36,7 @@ def landing(speed: float) -> Experiment:
 
     def before(engine: Engine, now: int) -> None:
         if now == 0:
-            engine.apply(command(robot, now, robot.joint_names, q[7:]))
+            engine.apply(loosened(command(robot, now, robot.joint_names, q[7:]), not driven))
 
     return Experiment(robot, State(q, v), DURATION, before)
 

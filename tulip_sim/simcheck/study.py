@@ -126,8 +126,8 @@ def _push(direction: str) -> Study:
     return _on_ground(experiment, 0.0, _springs(experiment), _body)
 
 
-def _landing(speed: float) -> Study:
-    experiment = landing(speed)
+def _landing(speed: float, driven: bool) -> Study:
+    experiment = landing(speed, driven)
 
     def compare(run: Run, other: Run) -> list[Difference]:
         own, their = run.recording, other.recording
@@ -149,6 +149,7 @@ STUDIES: dict[str, Callable[[], Study]] = {
     "flight": _flight,
     **{f"drop from {100 * height:.0f} cm": partial(_drop, height) for height in (0.01, 0.02, 0.03)},
     **{f"standing, pushed {direction}": partial(_push, direction) for direction in PUSHES},
-    **{f"landing at {speed} m/s": partial(_landing, speed) for speed in (0.1, 0.2, 0.3, 0.5)},
+    **{f"landing at {speed} m/s, loose": partial(_landing, speed, driven=False) for speed in (0.1, 0.3, 0.5)},
+    **{f"landing at {speed} m/s, driven": partial(_landing, speed, driven=True) for speed in (0.1, 0.3, 0.5)},
 }
 """All studies by name."""

@@ -10,7 +10,7 @@ from tulip_description.posture import standing_posture
 from tulip_description.robot import LEG_JOINTS, Robot, load_robot
 from tulip_sim.bodies import GRAVITY
 from tulip_sim.simcheck.engine import Engine, State
-from tulip_sim.simcheck.experiment import Experiment, command
+from tulip_sim.simcheck.experiment import Experiment, command, loosened
 
 HELD_MASS = 1.0e6  # [kg] of a trunk that the legs cannot move: the swing shifts it by micrometres
 HEIGHT = 3.0  # [m] of base_link: nothing touches the ground
@@ -45,8 +45,7 @@ def swing(driven: bool) -> Experiment:
         if driven:
             wanted = command(robot, now, LEFT, standing + STRIDES * np.sin(phase), RATE * STRIDES * np.cos(phase))
         else:
-            held = command(robot, now, LEFT, standing)
-            wanted = replace(held, stiffness=(1.0 - LOOSE) * held.stiffness, damping=(1.0 - LOOSE) * held.damping)
+            wanted = loosened(command(robot, now, LEFT, standing), LOOSE)
         engine.apply(wanted)
 
     q = np.concatenate([[0.0, 0.0, HEIGHT, 0.0, 0.0, 0.0, 1.0], joints])
