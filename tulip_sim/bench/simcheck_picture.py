@@ -94,6 +94,10 @@ def _ankle_roll(run: Run) -> Array:
     return turned
 
 
+def _depth(run: Run) -> Array:
+    return 1e3 * run.recording.depth
+
+
 def _impulse(run: Run) -> Array:
     return np.concatenate([[0.0], np.cumsum(run.recording.contact[:, 2])])
 
@@ -136,6 +140,7 @@ PANELS = (
     Panel("drop from 2 cm", "left ankle rolls", "[mrad]", _by_engine(_ankle_roll, begin=LANDED.start)),
     Panel("landing at 0.3 m/s, loose", "vertical impulse of the ground so far", "[N s]", _by_engine(_impulse)),
     Panel("landing at 0.3 m/s, driven", "vertical impulse of the ground so far", "[N s]", _by_engine(_impulse)),
+    Panel("landing at 0.5 m/s, loose", "depth of a sole", "[mm]", _by_step(_depth, "depth of a sole")),
 )
 
 
