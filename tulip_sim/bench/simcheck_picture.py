@@ -23,7 +23,7 @@ Curves = dict[str, tuple[Array, Array]]
 Make = Callable[[Study, Mapping[int, Run], Mapping[str, Run]], Curves]
 """Makes curves of a study from the simulator's runs, by steps a millisecond, and those of the references, by name."""
 
-POINTS = 250  # of a curve, about
+POINTS = 120  # of a curve, about
 LANDED = slice(55, 115)  # [ms] around the moment when what falls 2 or 3 cm touches the ground: 64, 78 ms
 HIP = {"roll": JOINTS.index("left_hip_roll"), "pitch": JOINTS.index("left_hip_pitch")}
 STYLES: dict[str, dict[str, Any]] = {
@@ -95,7 +95,7 @@ def _ankle_roll(run: Run) -> Array:
 
 
 def _depth(run: Run) -> Array:
-    return 1e3 * run.recording.depth
+    return np.concatenate([[0.0], 1e3 * run.recording.depth])
 
 
 def _impulse(run: Run) -> Array:
