@@ -12,7 +12,6 @@ import scipy.stats
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from tulip_motion.identification.experiment_settings import ExperimentSettings, make_experiment
 
 from tulip_description.body_file import BodySource, read_body, write_body
 from tulip_description.planar import Pose2D
@@ -20,6 +19,7 @@ from tulip_description.robot import Robot, load_robot
 from tulip_motion.identification.body_comparison import base_values, com_rows, rms
 from tulip_motion.identification.body_prior import Spread
 from tulip_motion.identification.com_identification import ComIdentification, IdentificationSettings, identify_com
+from tulip_motion.identification.experiment_settings import ExperimentSettings, make_experiment
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.physical_consistency import as_body, most_probable_body
 from tulip_sim.bench.identify_walk import (
