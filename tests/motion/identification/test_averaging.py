@@ -37,7 +37,7 @@ def reading(tick: int, forces: np.ndarray, joint_speed: float = 0.0, turning: fl
 
 
 def coloured(rng: np.random.Generator, number: int, memory: float) -> np.ndarray:
-    """Return (number, 2) readings, each of which remembers a share of the one before; variance 1, two correlated axes."""
+    """Return (number, 2) readings, each of which remembers a share of the one before; variance 1."""
     white = rng.standard_normal((number + 500, 2)) @ np.array([[1.0, 0.6], [0.0, 0.8]])
     return lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], white, axis=0)[500:]
 
@@ -87,7 +87,7 @@ def test_too_few_readings_and_an_unloaded_foot_are_refused():
         average.measurement()
     for tick in range(60):
         average.add(reading(tick, np.full(4, 50.0)))  # on the left foot
-    with pytest.raises(ValueError, match="right foot carried 0.0 N"):
+    with pytest.raises(ValueError, match="the right foot carried"):
         average.measurement()
 
 
