@@ -46,7 +46,7 @@ app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True)
 
 @app.command()
 def run(
-    postures: Annotated[int, typer.Option(help="On each foot.", min=1, max=100)] = PlanParameters.postures,
+    postures: Annotated[int, typer.Option(help="On each foot.", min=9, max=100)] = PlanParameters.postures,
     mode: Annotated[str, typer.Option(help="lockstep (one process) or graph (nodes as processes)")] = MODES[0],
     driver: Annotated[
         str, typer.Option(help="What stands for the body in the graph; 'none' for the real one.")

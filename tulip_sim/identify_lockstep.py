@@ -29,7 +29,6 @@ def run_lockstep(
     record: Path,
     show: Callable[[Progress], None],
     secret: int | None = None,
-    world_parameters: WorldParameters | None = None,
 ) -> Progress:
     """Do the experiment.
 
@@ -39,14 +38,14 @@ def run_lockstep(
         record: New folder for the recording.
         show: Told the progress.
         secret: Seed of the body that the simulated robot has; None for that of robot.yaml.
-        world_parameters: Physics and sensors; None for the usual ones.
 
     Raises:
         BadInputError: if the recording cannot be written.
         ValueError: if the settings fit no experiment.
     """
     experiment = make_experiment(settings)
-    parameters = world_parameters or WorldParameters()
+    # A secret body is the whole truth about the masses: it is what an identification is compared with.
+    parameters = WorldParameters() if secret is None else WorldParameters(mass_spread=0.0)
     robot = load_robot()
     body = None if secret is None else secret_body(robot, np.random.default_rng(secret))
     recording = LockstepRecording(record, RecordedPictures("none"))

@@ -33,7 +33,8 @@ class SafetyParameters:
     range_margin: float = 0.02  # [rad] an encoder may be beyond its joint's range
     least_load: float = 0.6  # of the robot's weight on its feet
     touch: float = 25.0  # [N] on the foot that shall be in the air
-    falling: float = 0.7  # [rad] of the trunk's tilt, now or in a moment: too late for anything but going limp
+    lost_sole: float = 0.35  # [rad] the same, when it is too late for anything but going limp
+    falling: float = 1.0  # [rad] of the trunk's tilt, now or in a moment, likewise; postures lean by 0.74 at most
     horizon: float = 0.2  # [s] that moment
 
 
@@ -55,12 +56,17 @@ class Watch:
         self._least_load = parameters.least_load * robot.mass * GRAVITY
         self._lasting: Counter[str] = Counter()
 
-    def is_falling(self, sensors: Sensors) -> bool:
-        """Return whether the robot can no longer be held."""
+    def is_falling(self, sensors: Sensors, body: BodyOnFeet) -> bool:
+        """Return whether the robot can no longer be held.
+
+        Args:
+            sensors: The reading.
+            body: What follows from it.
+        """
         p = self._parameters
         rotation = quaternion_matrix(sensors.imu_orientation.tolist())
         tilt, predicted = predicted_tilt(rotation, rotation @ sensors.imu_angular_velocity, p.horizon)
-        return max(tilt, predicted) > p.falling
+        return max(tilt, predicted) > p.falling or lean_error(sensors, body) > p.lost_sole
 
     def fault(self, sensors: Sensors, body: BodyOnFeet, stance: Side, share: float, wanted: Array) -> str:
         """Return why the experiment has to end, in words, or "".
@@ -93,7 +99,7 @@ class Watch:
         if (efforts > self._torques).any():
             worst = int(np.argmax(efforts / self._torques))
             found["torque"] = f"{names[worst]} takes {efforts[worst]:.0f} N m, its limit"
-        lean = math.acos(min(1.0, float(up_in_base(sensors) @ body.up)))
+        lean = lean_error(sensors, body)
         if lean > p.lean_error:
             found["lean"] = f"the trunk leans {lean:.2f} rad more than the joints say: the sole has tilted"
         if body.loads.sum() < self._least_load:
@@ -106,3 +112,8 @@ class Watch:
             if room < p.edge:
                 found["edge"] = f"the CoP is {1e3 * room:.0f} mm from the edge of the sole"
         return found
+
+
+def lean_error(sensors: Sensors, body: BodyOnFeet) -> float:
+    """Return the angle between up by the IMU and up by the joints, the stance sole lying level [rad]."""
+    return math.acos(min(1.0, float(up_in_base(sensors) @ body.up)))
