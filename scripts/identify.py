@@ -159,7 +159,7 @@ def validate(
             identified.base_covariance,
             identified.model_error,
             measured,
-            IdentificationSettings().mount_spread,
+            IdentificationSettings(),
         )
     except (BadInputError, ValueError) as error:
         _refuse(error)
@@ -210,7 +210,7 @@ def _held_aside(
         fitted.covariance,
         fitted.model_error,
         [measured[index] for index in sorted(others)],
-        settings.mount_spread,
+        settings,
     )
 
 

@@ -13,6 +13,11 @@ from numpy.typing import NDArray
 from tulip_description.robot import Robot
 from tulip_motion.identification.base_parameters import base_parameters
 from tulip_motion.identification.body_comparison import base_values
+from tulip_motion.identification.com_identification import (
+    IdentificationSettings,
+    disturbance_rows,
+    disturbance_spread,
+)
 from tulip_motion.identification.com_regressor import regressor_of
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.static_measurement import StaticMeasurement
@@ -60,12 +65,13 @@ def validate(
     covariance: Array,
     model_error: float,
     measurements: Sequence[StaticMeasurement],
-    mount_spread: float,
+    settings: IdentificationSettings,
 ) -> Validation:
     """Compare a body with postures.
 
-    The IMU's mounting angles are not known beforehand (they may be others on the day of these postures): their
-    covariance counts in the NEES, and of the residuals their part is taken off, found with that covariance as a prior.
+    How the IMU is mounted, and how the cells show the CoP, is not known beforehand (it may be otherwise
+    on the day of these postures): their covariance counts in the NEES, and of the residuals their part is taken off,
+    found with that covariance as a prior.
 
     Args:
         prior: The robot file's robot; gives the kinematics.
@@ -73,7 +79,7 @@ def validate(
         covariance: (r, r) of these [m^2].
         model_error: s of eq. (2e) [m].
         measurements: Of postures that were not used for the fit.
-        mount_spread: Standard deviation of the IMU's mounting angles [rad].
+        settings: What is taken for granted.
 
     Raises:
         IdentificationError: without postures.
@@ -84,7 +90,8 @@ def validate(
     rows = [regressor_of(prior, each.side).cop(each.joint_positions, each.down) for each in measurements]
     known = np.vstack([base.rows(each.cop) for each in rows])
     heights = [float(base.rows(each.com)[2] @ values) for each in rows]
-    mount = np.vstack([-height * each.slope_change for height, each in zip(heights, rows, strict=True)])
+    postures = zip(measurements, heights, [each.slope_change for each in rows], strict=True)
+    disturbances = np.vstack([disturbance_rows(prior, *posture) for posture in postures]) * disturbance_spread(settings)
     noise = np.zeros((2 * len(measurements),) * 2)
     for index, each in enumerate(measurements):
         here = slice(2 * index, 2 * index + 2)
@@ -92,22 +99,22 @@ def validate(
     measured = np.concatenate([each.cop for each in measurements])
     off = measured - known @ values
     prior_off = measured - known @ base_values(prior)
-    spread = noise + known @ covariance @ known.T + mount_spread**2 * mount @ mount.T
+    spread = noise + known @ covariance @ known.T + disturbances @ disturbances.T
     nees = float(off @ np.linalg.solve(spread, off)) / len(off)
     low, high = scipy.stats.chi2.interval(SURE, len(off))
     return Validation(
-        (off - _mounting(off, mount, noise, mount_spread)).reshape(-1, 2),
-        (prior_off - _mounting(prior_off, mount, noise, mount_spread)).reshape(-1, 2),
+        (off - _disturbed(off, disturbances, noise)).reshape(-1, 2),
+        (prior_off - _disturbed(prior_off, disturbances, noise)).reshape(-1, 2),
         nees,
         (float(low) / len(off), float(high) / len(off)),
     )
 
 
-def _mounting(off: Array, mount: Array, noise: Array, spread: float) -> Array:
-    """Return the part of residuals that the IMU's mounting explains."""
-    weighted = np.linalg.solve(noise, mount)
-    information = mount.T @ weighted + np.eye(2) / spread**2
-    part: Array = mount @ np.linalg.solve(information, weighted.T @ off)
+def _disturbed(off: Array, disturbances: Array, noise: Array) -> Array:
+    """Return the part of residuals that disturbances explain; those are given by their standard deviations."""
+    weighted = np.linalg.solve(noise, disturbances)
+    information = disturbances.T @ weighted + np.eye(disturbances.shape[1])
+    part: Array = disturbances @ np.linalg.solve(information, weighted.T @ off)
     return part
 
 
