@@ -35,6 +35,7 @@ from tulip_sim.bench import (
     odometry,
     push,
     referee,
+    simcheck,
     strategy,
     stress,
     vision,
@@ -44,7 +45,7 @@ from tulip_sim.bench.runner import Row, run, save, write_results
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress),
-    *(vision, localization, ball, head, latency, log),
+    *(simcheck, vision, localization, ball, head, latency, log),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"
