@@ -134,7 +134,7 @@ class Experiment:
             return control.limp(sensors)
         share, position, velocity = self._reference()
         command = control.command(sensors, now.stance, share, position, velocity)
-        fault = self._watch.fault(sensors, control.body, now.stance, share, command.position)
+        fault = self._watch.fault(sensors, control.body, now, command.position)
         if fault:
             self.abort(fault)
         if share == ALONE and self._average is None:
@@ -193,8 +193,10 @@ class Experiment:
             self._go_back()
         elif now.doing is Doing.UNLOAD:
             error = float(np.abs(control.aims[now.stance] - control.body.cop).max())
-            if error < self._parameters.unload_cop or self._elapsed >= now.time:
+            if error < self._parameters.unload_cop:
                 self._begin_next()
+            elif self._elapsed >= now.time:
+                self.abort(f"the weight does not come over the {now.stance.name.lower()} foot")
         elif now.doing is not Doing.HOLD and self._elapsed >= now.time and self._ahead:
             self._begin_next()
 

@@ -33,9 +33,9 @@ pytestmark = pytest.mark.sim
 
 @pytest.fixture(scope="module")
 def plans() -> tuple[FootPlan, ...]:
-    """Two postures on each foot, of a plan for more."""
+    """One posture on each foot, of a plan for more."""
     whole = make_plan(ROBOT, PlanParameters(postures=9, candidates=40))
-    return tuple(replace(plan, visits=plan.visits[:2]) for plan in whole)
+    return tuple(replace(plan, visits=plan.visits[:1]) for plan in whole)
 
 
 @pytest.fixture
@@ -75,12 +75,12 @@ def test_postures_of_a_wrong_model_are_held_and_the_cop_is_below_the_true_com(
     def tell(topic: str, stamp: int, value: object) -> None:
         if topic == "ground_truth" and experiment.progress.doing is Doing.HOLD:
             number = experiment.progress.posture
-            side = "left" if number < 2 else "right"
+            side = "left" if number < 1 else "right"
             cops.setdefault(number, []).append(true_cop(SECRET, world.truth(), side))
 
     end = run_experiment(experiment, world, tell)
-    assert (end.held, end.left_out, end.reason) == (4, (), "")
-    assert [hold.side for hold in experiment.holds] == ["left", "left", "right", "right"]
+    assert (end.held, end.left_out, end.reason) == (2, (), "")
+    assert [hold.side for hold in experiment.holds] == ["left", "right"]
     for hold, measurement in zip(experiment.holds, experiment.measurements, strict=True):
         # The true CoM while it was averaged: the last 1.2 s of the hold, told at 50 Hz.
         assert measurement.cop == pytest.approx(np.mean(cops[hold.posture][-60:], axis=0), abs=0.5e-3)
@@ -91,7 +91,7 @@ def test_postures_of_a_wrong_model_are_held_and_the_cop_is_below_the_true_com(
 
 @pytest.mark.parametrize("doing", [Doing.SHIFT, Doing.LIFT, Doing.MOVE, Doing.HOLD, Doing.LOWER])
 def test_abort_in_every_passage_leads_to_a_stand_on_both_feet(doing: Doing, plans: tuple[FootPlan, ...], world: World):
-    experiment = Experiment(ROBOT, [replace(plans[0], visits=plans[0].visits[:1])])
+    experiment = Experiment(ROBOT, plans[:1])
     since = 0
 
     def watch(now: float, progress: Progress) -> None:
@@ -129,7 +129,7 @@ def test_a_push_that_throws_the_robot_over_makes_it_limp(plans: tuple[FootPlan, 
 
 
 def test_a_nudge_during_a_hold_is_waited_out(plans: tuple[FootPlan, ...], world: World):
-    experiment = Experiment(ROBOT, [replace(plans[0], visits=plans[0].visits[:1])])
+    experiment = Experiment(ROBOT, plans[:1])
     end = disturbed(world, experiment, lambda: world.push([10.0, 0.0, 0.0], 100))
     assert (end.held, end.reason) == (1, "")
     assert stands_on_both_feet(world)
