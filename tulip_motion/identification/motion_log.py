@@ -27,7 +27,7 @@ class MotionLog:
         period: Between two readings [s].
         joint_positions: (t, n) [rad], order of `robot.joint_names`.
         joint_efforts: (t, n) torque of the motors [N m].
-        up: (t, 3) unit vector upwards in base_link, from the IMU's orientation; its heading is not used.
+        base_rotations: (t, 3, 3) from base_link to a level frame, from the IMU's orientation.
         angular_velocity: (t, 3) of base_link in base_link [rad/s].
         specific_force: (t, 3) of the IMU in base_link [m/s^2]; +g upwards at rest.
         foot_cells: (t, 2, 4) [N], as in `Sensors`; a foot in the air has none.
@@ -36,7 +36,7 @@ class MotionLog:
     period: float
     joint_positions: Array
     joint_efforts: Array
-    up: Array
+    base_rotations: Array
     angular_velocity: Array
     specific_force: Array
     foot_cells: Array
@@ -64,13 +64,13 @@ class MotionLog:
 
         cells = column("foot_cells")
         carries = cells.sum(axis=2, keepdims=True) > LEAST_LOAD
-        # Of the rotation from base_link to a level frame, the third row: the axes of imu_link are those of base_link.
-        up = Rotation.from_quat(column("imu_orientation")).as_matrix()[:, 2, :]
+        # The axes of imu_link are those of base_link.
+        rotations = Rotation.from_quat(column("imu_orientation")).as_matrix()
         return MotionLog(
             period * 1e-9,
             column("joint_positions"),
             column("joint_efforts"),
-            up,
+            rotations,
             column("imu_angular_velocity"),
             column("imu_linear_acceleration"),
             np.where(carries, cells, 0.0),
@@ -137,7 +137,7 @@ def smooth(log: MotionLog, cutoff: float) -> SmoothMotion:
 
     q, turning = passed(log.joint_positions), passed(log.angular_velocity)
     dq = rate_of_change(q)
-    up = passed(log.up)
+    up = passed(log.base_rotations[:, 2, :])  # the third row: upwards in base_link
     return SmoothMotion(
         q,
         dq,

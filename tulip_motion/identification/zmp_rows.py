@@ -64,7 +64,7 @@ class ZmpRows(NamedTuple):
 
 
 def zmp_rows(regressor: ZmpRegressor, log: MotionLog, parameters: RowParameters | None = None) -> ZmpRows:
-    """Return the equations of a recording, which begins or ends at rest on a level floor.
+    """Return the equations of a recording, which begins and ends at rest on a level floor.
 
     Raises:
         ValueError: if the recording has no rest to find the IMU's biases in, or no motion, or no force on the feet.
@@ -76,7 +76,7 @@ def zmp_rows(regressor: ZmpRegressor, log: MotionLog, parameters: RowParameters 
     if not (force > p.least_force).any():
         raise ValueError(f"the feet never carry {p.least_force} N; expected the log of a robot that stands")
     edge = round(1.0 / (p.cutoff * log.period))  # the filter knows only one side of the first and last readings
-    biases = find_biases(regressor, motion, log.period, p, edge)
+    biases = find_biases(regressor, log, motion, p, edge)
     moving = motion.specific_force[edge:-edge].std(axis=0).max()
     if moving < p.least_motion:
         raise ValueError(
@@ -106,12 +106,13 @@ def zmp_rows(regressor: ZmpRegressor, log: MotionLog, parameters: RowParameters 
 
 
 def find_biases(
-    regressor: ZmpRegressor, motion: SmoothMotion, period: float, parameters: RowParameters, edge: int
+    regressor: ZmpRegressor, log: MotionLog, motion: SmoothMotion, parameters: RowParameters, edge: int
 ) -> Biases:
-    """Return the IMU's biases from where the robot rests.
+    """Return the IMU's biases.
 
-    At rest on a level floor it turns nowhere, and feels gravity alone, along the normal of its soles, which the
-    encoders tell better than an IMU its own mounting: 3 mrad of that would be 2 mm of CoM.
+    Tilt and rate from where the robot rests: it turns nowhere, and stands on level soles, whose normal the encoders
+    tell better than an IMU its own mounting; 3 mrad of that would be 2 mm of CoM. Acceleration from the whole
+    recording: a body that begins and ends at rest has felt gravity alone on average, whatever it did in between.
 
     Raises:
         ValueError: if there is too little rest.
@@ -121,23 +122,19 @@ def find_biases(
     still &= (np.abs(motion.angular_velocity) < p.rest_speed).all(axis=1)
     still &= motion.foot_cells.sum(axis=(1, 2)) > p.least_force
     still[:edge] = still[len(still) - edge :] = False
-    if still.sum() * period < p.rest_time:
+    if still.sum() * log.period < p.rest_time:
         raise ValueError(
-            f"the robot rests for {still.sum() * period:.2f} s of the log; expected {p.rest_time} s or more:"
+            f"the robot rests for {still.sum() * log.period:.2f} s of the log; expected {p.rest_time} s or more:"
             " let it stand before it moves, so that the IMU's biases can be found"
         )
-    # The posture at rest varies by less than its noise: every tenth reading is enough.
-    normals = []
-    for t in np.flatnonzero(still)[::10]:
-        _, rotations = regressor.soles(motion.q[t])
-        normals.append(motion.foot_cells[t].sum(axis=1) @ rotations[:, :, 2])
-    true_up = _unit(np.mean(normals, axis=0))
-    felt_up = _unit(motion.up[still].mean(axis=0))
-    return Biases(
-        _least_turn(felt_up, true_up),
-        motion.angular_velocity[still].mean(axis=0),
-        motion.specific_force[still].mean(axis=0) - GRAVITY * true_up,
-    )
+    chosen = np.flatnonzero(still)[::5]  # at rest the next readings say the same
+    rotations = [regressor.soles(motion.q[t])[1] for t in chosen]
+    normals = [cells.sum(axis=1) @ soles[:, :, 2] for cells, soles in zip(motion.foot_cells[chosen], rotations, strict=True)]
+    tilt = _least_turn(_unit(motion.up[chosen].mean(axis=0)), _unit(np.mean(normals, axis=0)))
+    level = log.base_rotations @ tilt.T
+    felt = np.einsum("tij,tj->i", level, log.specific_force) / len(level)
+    bias = np.linalg.solve(level.mean(axis=0), felt - np.array([0.0, 0.0, GRAVITY]))
+    return Biases(tilt, motion.angular_velocity[still].mean(axis=0), bias)
 
 
 def _check(regressor: ZmpRegressor, log: MotionLog) -> None:
