@@ -72,7 +72,7 @@ class SimulatedRobot:
         self._dry_friction = robot.effort_limits * physics_rng.uniform(*p.joint_friction, n)
         self._place(pose)
         self._driver = JointDriver(robot, p.driver, start)
-        self._effort = np.zeros(n)
+        self._effort_sum, self._effort_count = np.zeros(n), 0
         self.joint_positions, self.joint_velocities = start.copy(), np.zeros(n)
         self._push_force, self._push_end = np.zeros(3), 0
         self._touches = {"left": TouchCounter(), "right": TouchCounter(), "body": TouchCounter()}
@@ -97,12 +97,14 @@ class SimulatedRobot:
 
     def drive(self, now: int) -> None:
         """Put the torques of the next millisecond on the joints, and a push on the trunk while there is one."""
-        self._effort = self._driver.torques(now, self.joint_positions, self.joint_velocities)
+        effort = self._driver.torques(now, self.joint_positions, self.joint_velocities)
+        self._effort_sum += effort
+        self._effort_count += 1
         pybullet.setJointMotorControlArray(
             self.body,
             self._joint_indices,
             pybullet.TORQUE_CONTROL,
-            forces=(self._effort - self._friction_torque()).tolist(),
+            forces=(effort - self._friction_torque()).tolist(),
             physicsClientId=self._client,
         )
         if now < self._push_end:
@@ -121,6 +123,7 @@ class SimulatedRobot:
         """Read the sensors if a reading is due at this millisecond."""
         if (now // MILLISECOND + self._delay) % self._parameters.sensors.period == 0:
             self._readings.append(self._sensors.measure(self._body_state(now)))
+            self._effort_sum[:], self._effort_count = 0.0, 0
 
     def sensors(self, now: int) -> Sensors:
         """Return the newest reading that has arrived by now."""
@@ -210,7 +213,7 @@ class SimulatedRobot:
             stamp=now,
             joint_positions=self.joint_positions,
             joint_velocities=self.joint_velocities,
-            joint_efforts=self._effort,
+            joint_efforts=self._effort_sum / max(self._effort_count, 1),
             base_position=position,
             base_orientation=orientation,
             base_rotation=rotation,

@@ -53,7 +53,8 @@ def inertial_prior(
             # A central difference: the square of the shift drops out.
             ahead, back = (pin.Inertia(link.mass, com + way, inertia) for way in (shift, -shift))
             columns.append(0.5 * (ahead.toDynamicParameters() - back.toDynamicParameters()))
-        size = inertia_share * float(np.trace(inertia)) / 3.0
+        # What first order leaves out of a shift, its square, counts where a link is light and small.
+        size = inertia_share * float(np.trace(inertia)) / 3.0 + link.mass * com_distance**2
         columns += [size * np.concatenate([np.zeros(4), unit]) for unit in np.eye(6)]
         spread = np.stack(columns, axis=1)
         start = PER_BODY * (frame.parentJoint - 1)

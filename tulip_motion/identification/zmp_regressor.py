@@ -9,9 +9,16 @@ ten standard parameters of each body, pi = (m, m c, I about the joint; ...):
 
     (F, M_base) = Y(q, v, a) pi                                                            (D2)
 
-The ZMP p is the point of the ground about which the horizontal moments vanish, so with u upwards and o on the ground
+The ZMP is the point of the ground about which the horizontal moments vanish, and the cells measure it as the CoP. So with
+u upwards and o the measured CoP, each instant gives two equations, and the cells' sum of forces the third:
 
-    u x M_o = (u . F) (p - o),    M_o = M_base - o x F                                     (D3)
+    u x M_o = 0,    u . F = sum of the cells,    M_o = M_base - o x F                      (D3)
+
+With any parameters, the ZMP that they predict lies (u x M_o) / (u . F) away from o.                               (D4)
+
+A sole carries on its rim, beyond its cells, and the cells may sit a little elsewhere than drawn: then they show the
+CoP's way from the middle of a foot too short or too long. With o = o_cells + a_x (way along) + a_y (way across), the two
+spreads a are parameters like the others.                                                                   (D5)
 
 All of it is written in axes of base_link. Inertial forces do not depend on where the base is or how fast it goes, only
 on its rotation and on the specific force that an accelerometer at base_link would feel, f = a - g: no position,
@@ -32,6 +39,8 @@ from tulip_description.robot import Robot
 
 Array = NDArray[np.float64]
 PER_BODY = 10
+SPREADS = 2
+"""Of the cells, along and across the soles; see eq. (D5)."""
 PARAMETER_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 """Of each moving body, in Pinocchio's order: mass [kg], first moments [kg m] and inertia [kg m^2] about its joint."""
 
@@ -58,17 +67,18 @@ class Ground(NamedTuple):
 
     Attributes:
         up: (3,) unit vector.
-        forward, left: (3,) unit vectors that span the ground, forward below base_link's x.
-        origin: (3,) o, the mean of the soles that carry, each by its load [m].
-        cop: (2,) centre of pressure of both feet from o, forward and left [m].
+        horizontal: (2, 3) unit vectors across it, forward below base_link's x, and left.
+        soles: (3,) mean of the soles that carry, each by its load [m].
+        cop: (3,) centre of pressure of both feet [m].
+        ways: (3, 2) of the CoP from the middle of the feet along and across the soles, for the spreads of (D5) [m].
         force: Vertical, of all cells [N].
     """
 
     up: Array
-    forward: Array
-    left: Array
-    origin: Array
+    horizontal: Array
+    soles: Array
     cop: Array
+    ways: Array
     force: float
 
 
@@ -87,7 +97,10 @@ def with_parameters(model: Any, parameters: Array) -> Any:
 
 
 class ZmpRegressor:
-    """Y of eq. (D2), the rows of eq. (D3), and what the cells say for them."""
+    """Y of eq. (D2), and the rows of eq. (D3) with (D5).
+
+    Their parameters are pi, (10 b,), followed by the `SPREADS` spreads of the cells.
+    """
 
     def __init__(self, robot: Robot) -> None:
         """Make the regressor of a robot; of its parameters it uses the kinematic ones alone."""
@@ -96,13 +109,8 @@ class ZmpRegressor:
         self._model.gravity.linear = np.zeros(3)  # gravity comes in with the specific force
         self._data = self._model.createData()
         self._soles = [self._model.getFrameId(name) for name in (frames.LEFT_SOLE, frames.RIGHT_SOLE)]
-        cells = np.array([foot.cells for foot in robot.feet])
-        self._cells = np.concatenate([cells, np.zeros((2, 4, 1))], axis=2)
-
-    @property
-    def size(self) -> int:
-        """How many standard parameters there are."""
-        return PER_BODY * (self._model.njoints - 1)
+        self._cells = np.array([foot.cells for foot in robot.feet])
+        self._middles = self._cells.mean(axis=1)
 
     @property
     def body_names(self) -> tuple[str, ...]:
@@ -134,22 +142,30 @@ class ZmpRegressor:
         """
         positions, rotations = self.soles(q)
         force = float(cells.sum())
-        origin = cells.sum(axis=1) @ positions / force
-        places = positions[:, None, :] + np.einsum("sij,scj->sci", rotations, self._cells)
-        forward, left = horizontal_axes(up)
-        away = np.einsum("sc,sci->i", cells, places) / force - origin
-        return Ground(up, forward, left, origin, np.array([away @ forward, away @ left]), force)
+        shares = cells.sum(axis=1) / force
+        moments = np.einsum("sc,sci->si", cells / force, self._cells)  # each foot's CoP in its sole, by its share
+        ways = np.einsum("sik,sk->ik", rotations[:, :, :2], moments - shares[:, None] * self._middles)
+        soles = shares @ positions
+        cop = soles + np.einsum("sik,sk->i", rotations[:, :, :2], moments)
+        return Ground(up, horizontal_axes(up), soles, cop, ways, force)
 
     def rows(self, motion: BodyMotion, ground: Ground) -> Array:
-        """Return (3, 10 b): what pi makes of (u . F) (p - o) forward and left [N m], and of u . F [N], eq. (D3)."""
+        """Return (3, 10 b + 2) rows of (D3), whose products shall be 0 forward and left [N m], and the force [N].
+
+        The first two are u x M_o, which for the parameters of (D5) is the force times the way from the CoP to the ZMP.
+        """
         base = self.inverse_dynamics(motion)[:6]
-        force, moment = base[:3], base[3:] - np.cross(ground.origin, base[:3], axisb=0, axisc=0)
-        # u x M forward is -(left . M), and left it is forward . M.
-        return np.stack([-ground.left @ moment, ground.forward @ moment, ground.up @ force])
+        force, moment = base[:3], base[3:] - np.cross(ground.cop, base[:3], axisb=0, axisc=0)
+        forward, left = ground.horizontal
+        rows = np.zeros((3, base.shape[1] + SPREADS))
+        # u x M forward is -(left . M), and to the left it is forward . M.
+        rows[:, :-SPREADS] = np.stack([-left @ moment, forward @ moment, ground.up @ force])
+        rows[:2, -SPREADS:] = -ground.force * ground.horizontal @ ground.ways
+        return rows
 
 
-def horizontal_axes(up: Array) -> tuple[Array, Array]:
-    """Return two (3,) unit vectors across `up`: one below the x axis, and the one to its left."""
+def horizontal_axes(up: Array) -> Array:
+    """Return (2, 3) unit vectors across `up` (3,): one below the x axis, and the one to its left."""
     forward = np.array([1.0, 0.0, 0.0]) - up[0] * up
     forward /= np.linalg.norm(forward)
-    return forward, np.cross(up, forward)
+    return np.array([forward, np.cross(up, forward)])

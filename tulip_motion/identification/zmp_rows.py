@@ -47,8 +47,8 @@ class ZmpRows(NamedTuple):
 
     Attributes:
         times: (t,) since the start of the recording [s].
-        equations: Design (t, 3, 10 b) and target (t, 3): force times ZMP forward and left [N m], force [N].
-        cop: (t, 2) measured, forward and left of the soles' mean [m].
+        equations: Design (t, 3, 10 b + 2) and target (t, 3) of (D3).
+        cop: (t, 2) as the cells say, forward and left of the soles' mean [m].
         biases: Found at rest.
     """
 
@@ -58,7 +58,14 @@ class ZmpRows(NamedTuple):
     biases: Biases
 
     def zmp(self, parameters: Array) -> Array:
-        """Return (t, 2) ZMP that standard parameters (10 b,) predict, forward and left of the soles' mean [m]."""
+        """Return (t, 2) ZMP that parameters (10 b + 2,) predict for the cells, forward and left of the soles' mean [m].
+
+        With spreads of the cells, it is the place where those cells would show it, as far as the error is small.
+        """
+        return self.cop + self.error(parameters)
+
+    def error(self, parameters: Array) -> Array:
+        """Return (t, 2) way from the measured CoP to the ZMP that parameters (10 b + 2,) predict [m], eq. (D4)."""
         along, left, force = np.moveaxis(self.equations.design @ parameters, 1, 0)
         return np.stack([along, left], axis=1) / force[:, None]
 
@@ -85,24 +92,23 @@ def zmp_rows(regressor: ZmpRegressor, log: MotionLog, parameters: RowParameters 
         )
     every = max(1, round(1.0 / (p.row_rate * log.period)))
     chosen = [t for t in range(edge, len(force) - edge, every) if force[t] > p.least_force]
-    lever = np.array(regressor.robot.imu.origin)
     design, target, cop = [], [], []
     for t in chosen:
-        turning = motion.angular_velocity[t] - biases.angular_velocity
-        swing = np.cross(motion.angular_acceleration[t], lever) + np.cross(turning, np.cross(turning, lever))
-        body = BodyMotion(
-            motion.q[t],
-            motion.dq[t],
-            motion.ddq[t],
-            turning,
-            motion.angular_acceleration[t],
-            motion.specific_force[t] - biases.specific_force - swing,
-        )
+        body = body_at(regressor, motion, biases, t)
         ground = regressor.ground(motion.q[t], biases.tilt @ motion.up[t], motion.foot_cells[t])
         design.append(regressor.rows(body, ground))
-        target.append([*(ground.force * ground.cop), ground.force])
-        cop.append(ground.cop)
+        target.append([0.0, 0.0, ground.force])
+        cop.append(ground.horizontal @ (ground.cop - ground.soles))
     return ZmpRows(log.times[chosen], Series(np.array(design), np.array(target)), np.array(cop), biases)
+
+
+def body_at(regressor: ZmpRegressor, motion: SmoothMotion, biases: Biases, t: int) -> BodyMotion:
+    """Return the motion of the body at reading t, the IMU's specific force moved to base_link's origin."""
+    lever = np.array(regressor.robot.imu.origin)
+    turning, change = motion.angular_velocity[t] - biases.angular_velocity, motion.angular_acceleration[t]
+    at_imu = motion.specific_force[t] - biases.specific_force
+    force = at_imu - np.cross(change, lever) - np.cross(turning, np.cross(turning, lever))
+    return BodyMotion(motion.q[t], motion.dq[t], motion.ddq[t], turning, change, force)
 
 
 def find_biases(
