@@ -200,8 +200,7 @@ def _find(items: tuple[_Named, ...], name: str, kind: str) -> _Named:
     raise ValueError(f"no {kind} is named {name!r}; expected one of {', '.join(item.name for item in items)}")
 
 
-@cache
-def load_robot(variant: str = "playing", path: Path | None = None) -> Robot:
+def load_robot(variant: str = "playing", path: Path | None = None, body: Path | None = None) -> Robot:
     """Read the robot from its parameter file.
 
     Args:
@@ -209,11 +208,21 @@ def load_robot(variant: str = "playing", path: Path | None = None) -> Robot:
             "table": the team's chain and numbers exactly, 16.74 kg, without upper body and head; some of its
             inertias belong to no possible body.
         path: Another parameter file than the robot.yaml beside this module.
+        body: Body file of an identification, whose masses, CoMs and inertias take the place of the parameter file's.
 
     Raises:
-        ValueError: if the variant is unknown or the file is not as expected.
-        OSError: if the file cannot be read.
+        ValueError: if the variant is unknown, or a file cannot be read or is not as expected.
     """
+    robot = _read_robot(variant, path)
+    if body is None:
+        return robot
+    from tulip_description.body_file import read_body  # which needs the classes above
+
+    return read_body(body).on(robot)
+
+
+@cache
+def _read_robot(variant: str, path: Path | None) -> Robot:
     from tulip_description.robot_file import read_robot  # which needs the classes above
 
     return read_robot(variant, path if path is not None else Path(__file__).with_name("robot.yaml"))

@@ -1,0 +1,148 @@
+"""Is this a log of this robot? Its weight, its CoP by the prior's bounds, and which mix-up of cells would explain it.
+
+Before any fit the CoP is predicted from the prior, with the covariance that the spread of masses and CoMs, the IMU's
+mounting and the cells leave. Each supposed mix-up gives other measurements; what they are worth is their likelihood.
+A log is refused if one of the mix-ups is far likelier than the log as it stands, or if even that is absurd.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from tulip_description.model import Side
+from tulip_description.robot import Robot
+from tulip_motion.identification.body_prior import Spread, body_prior, greatest_mass_error
+from tulip_motion.identification.com_regressor import PER_BODY, cop_rows, regressor_of, slope_change, slope_of
+from tulip_motion.identification.identification_error import IdentificationError
+from tulip_motion.identification.static_measurement import StaticMeasurement
+
+Array = NDArray[np.float64]
+ROUGHNESS = 2e-3  # [m] what a sound log may err by beside all that is modelled
+FAR_LIKELIER = 20.0
+"""Difference of log-likelihoods that convinces: one in 5e8."""
+ABSURD = 1e-9
+"""Probability of a log below which it is not this robot's."""
+OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
+
+
+class Mixup(NamedTuple):
+    """A way in which cells may have been mixed up.
+
+    Attributes:
+        name: In words.
+        undo: Gives the measurement as it would have been.
+    """
+
+    name: str
+    undo: Callable[[Robot, StaticMeasurement], StaticMeasurement]
+
+
+def _mirrored(axis: int, sides: tuple[Side, ...]) -> Callable[[Robot, StaticMeasurement], StaticMeasurement]:
+    def undo(robot: Robot, measurement: StaticMeasurement) -> StaticMeasurement:
+        if measurement.side not in sides:
+            return measurement
+        cells = np.array(robot.feet[0 if measurement.side == "left" else 1].cells)
+        sign = np.array([-1.0, 1.0]) if axis == 0 else np.array([1.0, -1.0])
+        cop = measurement.cop.copy()
+        cop[axis] = 2.0 * float(cells[:, axis].mean()) - cop[axis]
+        return replace(measurement, cop=cop, cop_covariance=measurement.cop_covariance * np.outer(sign, sign))
+
+    return undo
+
+
+def _other_foot(robot: Robot, measurement: StaticMeasurement) -> StaticMeasurement:
+    """Take the cells as the other foot's: heel and toe stay, inner and outer lie mirrored."""
+    sign = np.array([1.0, -1.0])
+    covariance = measurement.cop_covariance * np.outer(sign, sign)
+    return replace(measurement, side=OTHER[measurement.side], cop=measurement.cop * sign, cop_covariance=covariance)
+
+
+MIXUPS: tuple[Mixup, ...] = (
+    Mixup("the cells of the left and the right foot are swapped", _other_foot),
+    *(
+        Mixup(f"{what} cells of {where} are swapped", _mirrored(axis, sides))
+        for axis, what in ((0, "heel and toe"), (1, "inner and outer"))
+        for where, sides in (
+            ("both feet", ("left", "right")),
+            ("the left foot", ("left",)),
+            ("the right foot", ("right",)),
+        )
+    ),
+)
+
+
+def check_plausible(
+    robot: Robot, measurements: Sequence[StaticMeasurement], mass: float, spread: Spread, mount_spread: float
+) -> None:
+    """Check that measurements can be this robot's.
+
+    Args:
+        robot: As it is believed to be.
+        measurements: Of it.
+        mass: As the cells weigh it [kg].
+        spread: Of its bodies about the robot file.
+        mount_spread: Of the IMU's mounting angles [rad].
+
+    Raises:
+        IdentificationError: if they cannot; names the mix-up that explains them, if one does.
+    """
+    allowed = greatest_mass_error(robot, spread)
+    if abs(mass - robot.mass) > allowed:
+        raise IdentificationError(
+            f"the cells weigh {mass:.2f} kg, the robot {robot.variant} has {robot.mass:.2f} kg, and masses are taken to"
+            f" be known to {allowed:.2f} kg in all: the log belongs to another robot, or the cells' scale is wrong; if"
+            " it is this robot, state a larger spread of masses"
+        )
+    found, chi_square = _log_likelihood(robot, measurements, mass, spread, mount_spread)
+    rivals = []
+    for mixup in MIXUPS:
+        undone = [mixup.undo(robot, measurement) for measurement in measurements]
+        rivals.append((*_log_likelihood(robot, undone, mass, spread, mount_spread), mixup.name))
+    best, best_chi_square, name = max(rivals)
+    numbers = 2 * len(measurements)
+    if best > found + FAR_LIKELIER and chi2.sf(best_chi_square, numbers) > ABSURD:
+        raise IdentificationError(
+            f"the CoP is where it would be if {name}: correct the wiring or the order of the cells and measure again"
+        )
+    if chi2.sf(chi_square, numbers) < ABSURD:
+        raise IdentificationError(
+            f"the CoP is not where this robot's can be (chi^2 {chi_square:.0f} for {numbers} numbers), and no swap of"
+            " cells explains it: a log of another robot, a broken cell, or encoders with another zero; check these, or"
+            " state a larger spread of masses and CoMs if the robot was rebuilt"
+        )
+
+
+def _log_likelihood(
+    robot: Robot, measurements: Sequence[StaticMeasurement], mass: float, spread: Spread, mount_spread: float
+) -> tuple[float, float]:
+    """Return the logarithm of the likelihood of measurements by the prior, up to a constant, and their chi^2."""
+    prior = body_prior(robot, spread, mass)
+    rows, nuisance, noise = [], [], []
+    for measurement in measurements:
+        regressor = regressor_of(robot, measurement.side)
+        turn = regressor.base_rotation(measurement.joint_positions)
+        com = regressor.com(measurement.joint_positions)
+        rows.append(cop_rows(com, slope_of(turn @ measurement.down)))
+        nuisance.append(-float(com[2] @ prior.mean) * slope_change(turn, measurement.down))
+        noise.append(measurement.cop_covariance)
+    stack, mounting = np.vstack(rows), np.vstack(nuisance)
+    # The masses add up to what was weighed: the prior under this condition.
+    total = np.tile(np.eye(PER_BODY)[0], len(robot.links))
+    mixed = prior.covariance @ total
+    gain = mixed / float(total @ mixed)
+    mean = prior.mean + gain * (1.0 - float(total @ prior.mean))
+    covariance = prior.covariance - np.outer(gain, mixed)
+    spread_of_cop = stack @ covariance @ stack.T + mount_spread**2 * mounting @ mounting.T
+    for index, each in enumerate(noise):
+        place = slice(2 * index, 2 * index + 2)
+        spread_of_cop[place, place] += each + ROUGHNESS**2 * np.eye(2)
+    error = np.concatenate([measurement.cop for measurement in measurements]) - stack @ mean
+    lower = np.linalg.cholesky(spread_of_cop)
+    chi_square = float(np.sum(np.linalg.solve(lower, error) ** 2))
+    return -0.5 * chi_square - float(np.log(np.diag(lower)).sum()), chi_square

@@ -1,0 +1,111 @@
+"""From base parameters back to a whole robot that can be.
+
+Static postures tell only the base parameters theta_b = K theta (2c), 31 numbers of the playing robot's 71: sums of
+moments and masses along the legs. Gait and feedforward need masses, CoMs and inertias of all links. Of all bodies that
+fit, the most probable one is taken, by Bayes' rule with the robot file as prior, eq. (2d):
+
+    z = argmin |z|^2 + |theta_b - K (mean + factor z)|^2 by the covariance of theta_b                         (2f)
+    such that the masses are those that the cells weigh, in sum, and each at least LIGHTEST of the robot file's
+
+What is identified: the base parameters, which the result reproduces within their covariance. What is prior: how a sum is
+shared among links, as between the masses of thigh and trunk; and all inertias: those of the robot file, each scaled by
+its link's mass and moved with its CoM. So scaled they stay moments that a body can have, and with positive masses all
+pseudo-inertias are positive definite. If no such body reproduces the base parameters, that is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+from scipy.stats import chi2
+
+from tulip_description.pseudo_inertia import why_impossible
+from tulip_description.robot import Link, Robot, realizable_inertia
+from tulip_motion.identification.body_prior import body_prior
+from tulip_motion.identification.com_identification import ComIdentification
+from tulip_motion.identification.com_regressor import PER_BODY
+from tulip_motion.identification.identification_error import IdentificationError
+
+Array = NDArray[np.float64]
+LIGHTEST = 0.1
+"""Share of its mass in the robot file that a link keeps at least."""
+WEIGHED = 1e-6
+"""Share of the whole mass to which the links' masses add up to it."""
+IMPROBABLE = 1e-6
+"""Probability of base parameters, given the best body, below which no body is taken to have them."""
+
+
+@dataclass(frozen=True)
+class WholeBody:
+    """The most probable body of a robot.
+
+    Attributes:
+        robot: With its masses, CoMs and inertias.
+        told: (links, 4) how much of each mass and CoM coordinate the postures told: 0 where it is the prior's, 1 where
+            nothing is left of the prior's variance.
+        misfit: chi^2 of the base parameters that it has against those identified.
+    """
+
+    robot: Robot
+    told: Array
+    misfit: float
+
+
+def most_probable_body(found: ComIdentification) -> WholeBody:
+    """Return the most probable realizable body with the base parameters that were identified.
+
+    Raises:
+        IdentificationError: if there is none, or it is no body that can be; the message says why.
+    """
+    robot, unknown = found.prior, found.base.unknown
+    prior = body_prior(robot, found.settings.spread, found.mass)
+    combinations = found.base.combinations[unknown]
+    whiten = np.linalg.inv(np.linalg.cholesky(found.covariance[unknown, unknown]))
+    # Rows of z: the base parameters, the sum of all masses, and the prior.
+    data = np.vstack((whiten @ combinations, found.base.combinations[-1] / WEIGHED))
+    wanted = np.append(whiten @ found.values[unknown], found.values[-1] / WEIGHED) - data @ prior.mean
+    told = data @ prior.factor
+    count = len(prior.mean)
+    lower = np.full(count, -np.inf)
+    sizes = np.diag(prior.factor)[::PER_BODY]
+    lower[::PER_BODY] = (LIGHTEST - 1.0) * prior.mean[::PER_BODY] / sizes
+    z = lsq_linear(
+        np.vstack((told, np.eye(count))), np.append(wanted, np.zeros(count)), bounds=(lower, np.inf), tol=1e-14
+    ).x
+    misfit = float(np.sum((told @ z - wanted)[:-1] ** 2))
+    if chi2.sf(misfit, len(combinations)) < IMPROBABLE:
+        raise IdentificationError(
+            f"no body with positive masses near the robot file's has the base parameters that were identified (chi^2"
+            f" {misfit:.0f} for {len(combinations)}): state a larger spread of masses and CoMs if the robot was"
+            " rebuilt, else look for a cell or an encoder that is off"
+        )
+    theta = (prior.mean + prior.factor @ z).reshape(-1, PER_BODY) * found.mass
+    left = np.diag(np.linalg.inv(told.T @ told + np.eye(count)))
+    return WholeBody(_with_bodies(robot, theta), (1.0 - left).reshape(-1, PER_BODY), misfit)
+
+
+def _with_bodies(robot: Robot, theta: Array) -> Robot:
+    """Return a robot with masses and first moments (links, 4) [kg], [kg m], and inertias scaled by the masses."""
+    links = []
+    for link, (mass, *moments) in zip(robot.links, theta.tolist(), strict=True):
+        x, y, z = (moment / mass for moment in moments)
+        a, b, c = realizable_inertia(link.inertia)
+        scale = mass / link.mass
+        links.append(replace(link, mass=mass, com=(x, y, z), inertia=(a * scale, b * scale, c * scale)))
+    check_realizable(links)
+    return replace(robot, links=tuple(links))
+
+
+def check_realizable(links: list[Link]) -> None:
+    """Check that bodies can be.
+
+    Raises:
+        IdentificationError: if one cannot; names it and says why.
+    """
+    for link in links:
+        reason = why_impossible(link.mass, link.com, link.inertia)
+        if reason:
+            raise IdentificationError(f"no body is like link {link.name}: {reason}")
