@@ -60,7 +60,7 @@ def fit(series: Sequence[Series], prior: Prior) -> Fit:
 
     With the prior pi ~ N(pi_0, L L^T) and pi = pi_0 + L z, z minimizes
 
-        |z|^2 + sum over kinds k of |A_k L z - (b_k - A_k pi_0)|^2 / (s_k^2 t_k)                          (D4)
+        |z|^2 + sum over kinds k of |A_k L z - (b_k - A_k pi_0)|^2 / (s_k^2 t_k)                          (D7)
 
     s_k is the standard deviation of the residuals and t_k their correlation time in samples, the sum of their
     autocorrelation: t successive errors of a slow cause are one error, not t, and give the information of one.
