@@ -20,10 +20,10 @@ from tulip_description.yaml_file import read_yaml, write_lines
 Array = NDArray[np.float64]
 VERSION = 1
 HEAD = """\
-# Masses [kg], CoMs [m] in the links' frames, and principal moments about the CoMs [kg m^2] of a robot's links. They take
-# the place of those of robot.yaml: load_robot(body=...), and the parameter body_file of motion control.
-# Static postures tell the base parameters alone [m], by the whole mass, with their covariance [m^2]. How they are shared
-# among links is the most probable way beside robot.yaml; inertias are those of robot.yaml, scaled by the masses.
+# Masses [kg], CoMs [m] in the links' frames, and principal moments about the CoMs [kg m^2] of a robot's links. They
+# take the place of those of robot.yaml: load_robot(body=...), and the parameter body_file of motion control.
+# Static postures tell the base parameters alone [m], by the whole mass, with their covariance [m^2]. How they are
+# shared among links is the most probable way beside robot.yaml; inertias are robot.yaml's, scaled by the masses.
 # See docs/identification.md."""
 
 

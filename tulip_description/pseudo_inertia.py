@@ -15,9 +15,9 @@ Array = NDArray[np.float64]
 def pseudo_inertia(mass: float, com: Vector, inertia: Vector) -> Array:
     """Return (4, 4) J = integral of (x, 1)(x, 1)^T dm in the link's frame.
 
-    J = [[S, m c], [m c^T, m]] with the second moments S = 1/2 tr(I) 1 - I of the inertia I about the link's origin. It is
-    positive definite exactly if some spread of positive mass has this mass, CoM and inertia (Wensing, Kim and Slotine,
-    "Linear matrix inequalities for physically consistent inertial parameter identification", 2018).
+    J = [[S, m c], [m c^T, m]] with the second moments S = 1/2 tr(I) 1 - I of the inertia I about the link's origin. It
+    is positive definite exactly if some spread of positive mass has this mass, CoM and inertia (Wensing, Kim and
+    Slotine, "Linear matrix inequalities for physically consistent inertial parameter identification", 2018).
 
     Args:
         mass: [kg].

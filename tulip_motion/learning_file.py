@@ -19,9 +19,9 @@ from tulip_motion.step_learning import Key, Situation, StepLearner
 VERSION = 1
 APART = (
     *("kick_", "max_kick_", "side_kick_", "max_side_kick_", "walking_kick_", "max_walking_kick_", "ball_radius"),
-    *("learning_", "odometry_", "limp_", "fall_", "upright_"),
+    *("body_file", "learning_", "odometry_", "limp_", "fall_", "upright_"),
 )
-"""Beginnings of the parameters that leave a step as it is."""
+"""Beginnings of the parameters that leave a step as it is, and of one that the robot's digest speaks of."""
 
 
 class LearningFile:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from tulip_description.body_file import read_body
 from tulip_description.model import floating_model
 from tulip_description.planar import Pose2D
 from tulip_description.robot import HEAD_JOINTS, LEG_JOINTS, Robot
@@ -59,8 +61,18 @@ class Motion:
     """Stands, walks, kicks, and goes limp when the robot falls."""
 
     def __init__(self, parameters: MotionParameters, robot: Robot) -> None:
-        """Make motion control for a robot. It stands when the first sensors come in."""
+        """Make motion control for a robot. It stands when the first sensors come in.
+
+        Args:
+            parameters: Of motion control; with `body_file` the robot has the body that was identified.
+            robot: As its file has it.
+
+        Raises:
+            ValueError: if a parameter does not fit this robot, or the body file cannot be used.
+        """
         p = self._parameters = parameters
+        if p.body_file:
+            robot = read_body(Path(p.body_file)).on(robot)
         # The head is light and near its axes: the legs are controlled as if it looked straight ahead.
         model = floating_model(with_fixed_head(robot))
         self._estimator = StateEstimator(p, model, np.array([foot.cells for foot in robot.feet]))

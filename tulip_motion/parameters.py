@@ -151,6 +151,9 @@ class MotionParameters:
     clik_gain_position: float = 20.0  # [1/s] K_p
     clik_gain_orientation: float = 20.0  # [1/s] K_o
 
+    # Model of gait and feedforward: masses, CoMs and inertias of an identification instead of the robot file's
+    body_file: str = ""  # as scripts/identify.py writes it; "" for robot.yaml
+
     # Feedforward, eq. (14): "full", or "gravity" as in 2012, at rest without acceleration, or "none"
     feedforward: str = "full"
     # Eq. (15): "zmp" shares the weight by the commanded ZMP about the common centre of pressure;

@@ -11,9 +11,7 @@ from tulip_description.robot import Link, Robot, load_robot, realizable_inertia
 UNLISTED = 0.001  # [kg] of a body that is on the robot and not in the team's table
 
 
-def secret_body(
-    robot: Robot, rng: np.random.Generator, mass_spread: float = 0.2, com_spread: float = 0.02
-) -> Robot:
+def secret_body(robot: Robot, rng: np.random.Generator, mass_spread: float = 0.2, com_spread: float = 0.02) -> Robot:
     """Return the robot with other masses, CoMs and inertias, and the same kinematics.
 
     Args:
@@ -44,9 +42,7 @@ def table_robot() -> Robot:
     What the table does not list, upper body and head, weighs next to nothing; `load_robot()` is the truth beside it.
     """
     listed = {link.name for link in load_robot("table").links}
-    links = [
-        link if link.name in listed else _scaled(link, UNLISTED / link.mass) for link in load_robot().links
-    ]
+    links = [link if link.name in listed else _scaled(link, UNLISTED / link.mass) for link in load_robot().links]
     return replace(load_robot(), links=tuple(links))
 
 

@@ -44,30 +44,35 @@ class SimulatedRobot:
         pose: Pose2D,
         carpet: int,
         rng: tuple[np.random.Generator, np.random.Generator],
+        true_body: Robot | None = None,
     ) -> None:
         """Load it, at rest, its soles on the ground; it holds its posture until the first commands come.
 
         Args:
             client: Physics engine.
-            robot: What to load.
+            robot: What it is like, as motion control may know.
             parameters: Physics and sensors.
             start: (n,) posture at the start [rad], feet flat.
             pose: Of base_link in map, seen from above.
             carpet: The ground's body, which the soles feel.
             rng: Where its own masses and friction come from, and the errors of its sensors.
+            true_body: Whose masses, CoMs and inertias it has; None for those of `robot`.
 
         Raises:
-            ValueError: if start has a wrong shape or the feet of that posture are not level.
+            ValueError: if start has a wrong shape, the feet of that posture are not level, or true_body is of another
+                shape than robot.
         """
         self.robot, self._client, self._parameters, self._carpet = robot, client, parameters, carpet
         self._start, self._start_height = start, _base_height(robot, start)
-        p = parameters
+        p, body = parameters, true_body or robot
+        if body.joints != robot.joints or [link.name for link in body.links] != [link.name for link in robot.links]:
+            raise ValueError("true_body has other links or joints than robot; expected other masses alone")
         physics_rng, sensor_rng = rng
         spread = physics_rng.uniform(1.0 - p.mass_spread, 1.0 + p.mass_spread, len(robot.links))
-        self.body, self.index = bodies.add_robot(client, robot, p.mass_scale * spread)
+        self.body, self.index = bodies.add_robot(client, body, p.mass_scale * spread)
         self._joint_indices = [self.index[name] for name in robot.joint_names]
         self._foot_links = tuple(self.index[sole.link] for sole in robot.soles)
-        self._com_in_base = np.array(robot.links[0].com)
+        self._com_in_base = np.array(body.links[0].com)
         n = len(self._joint_indices)
         self._dry_friction = robot.effort_limits * physics_rng.uniform(*p.joint_friction, n)
         self._place(pose)

@@ -37,11 +37,14 @@ class World:
         parameters: Physics and sensors.
         seed: Of everything random: masses, friction, sensor errors; each robot has its own.
         field: Geometry of the field; None for the project's own.
-        robot: What the robots are like; None for the playing robot.
+        robot: What the robots are like, as motion control may know; None for the playing robot.
         joint_positions: (n,) posture at the start [rad], feet flat; None for `standing_posture`.
+        true_body: Whose masses, CoMs and inertias the robots really have, before the parameters' random changes; None
+            for those of `robot`.
 
     Raises:
-        ValueError: if joint_positions has a wrong shape or the feet of that posture are not level.
+        ValueError: if joint_positions has a wrong shape, the feet of that posture are not level, or true_body is of
+            another shape than robot.
     """
 
     def __init__(
@@ -52,6 +55,7 @@ class World:
         field: Field | None = None,
         robot: Robot | None = None,
         joint_positions: ArrayLike | None = None,
+        true_body: Robot | None = None,
     ) -> None:
         self.scenario = scenario
         self.parameters = parameters if parameters is not None else WorldParameters()
@@ -82,7 +86,7 @@ class World:
             if index > 0:
                 physics_rng, sensor_rng = seeds.spawn(2)
             rng = (physics_rng, sensor_rng)
-            robots.append(SimulatedRobot(self._client, self.robot, p, start, pose, carpet, rng))
+            robots.append(SimulatedRobot(self._client, self.robot, p, start, pose, carpet, rng, true_body))
         self.robots = tuple(robots)
         self.place_ball(*scenario.ball)
 

@@ -6,10 +6,11 @@ postures depend on the others, W_2 = W_1 B, and with theta split alike
 
     W theta = W_1 theta_b,    theta_b = theta_1 + B theta_2 = K theta                                         (2c)
 
-(Gautier, "Numerical calculation of the base inertial parameters of robots", 1991). W holds the x and y rows on both feet:
-the CoP shows no others. Which columns are kept is a choice; here it depends on their names alone: first moments before
-masses, and bodies from the trunk outwards. Then every child's mass goes into its parent's moments by the way from joint
-to joint, and the one mass that is kept, the trunk's, becomes the sum of all, which is 1 by the definition of theta.
+(Gautier, "Numerical calculation of the base inertial parameters of robots", 1991). W holds the x and y rows on both
+feet: the CoP shows no others. Which columns are kept is a choice; here it depends on their names alone: first moments
+before masses, and bodies from the trunk outwards. Then every child's mass goes into its parent's moments by the way
+from joint to joint, and the one mass that is kept, the trunk's, becomes the sum of all, which is 1 by the definition of
+theta.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def reduce_columns(stack: Array, preference: Sequence[int]) -> Reduction:
             directions = np.column_stack((directions, rest / size))
     if len(kept) != rank:
         raise ValueError(f"{len(kept)} columns are independent one by one, but the rank is {rank}; expected the same")
-    combinations = np.linalg.lstsq(stack[:, kept], stack, rcond=None)[0]
+    combinations: Array = np.linalg.lstsq(stack[:, kept], stack, rcond=None)[0]
     combinations[np.abs(combinations) < DEPENDENT] = 0.0
     return Reduction(tuple(kept), combinations)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from scipy.stats import chi2
 from tulip_description.model import Side
 from tulip_description.robot import Robot
 from tulip_motion.identification.body_prior import Spread, body_prior, greatest_mass_error
-from tulip_motion.identification.com_regressor import PER_BODY, cop_rows, regressor_of, slope_change, slope_of
+from tulip_motion.identification.com_regressor import PER_BODY, regressor_of
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.static_measurement import StaticMeasurement
 
@@ -43,14 +43,17 @@ class Mixup(NamedTuple):
     undo: Callable[[Robot, StaticMeasurement], StaticMeasurement]
 
 
-def _mirrored(axis: int, sides: tuple[Side, ...]) -> Callable[[Robot, StaticMeasurement], StaticMeasurement]:
+def _mirrored(
+    signs: tuple[float, float], sides: tuple[Side, ...]
+) -> Callable[[Robot, StaticMeasurement], StaticMeasurement]:
+    """Mirror the CoP of some feet about the middle of their cells, on the axes whose sign is -1."""
+
     def undo(robot: Robot, measurement: StaticMeasurement) -> StaticMeasurement:
         if measurement.side not in sides:
             return measurement
-        cells = np.array(robot.feet[0 if measurement.side == "left" else 1].cells)
-        sign = np.array([-1.0, 1.0]) if axis == 0 else np.array([1.0, -1.0])
-        cop = measurement.cop.copy()
-        cop[axis] = 2.0 * float(cells[:, axis].mean()) - cop[axis]
+        sign = np.array(signs)
+        middle = np.mean(robot.feet[0 if measurement.side == "left" else 1].cells, axis=0)
+        cop = middle + sign * (measurement.cop - middle)
         return replace(measurement, cop=cop, cop_covariance=measurement.cop_covariance * np.outer(sign, sign))
 
     return undo
@@ -66,10 +69,14 @@ def _other_foot(robot: Robot, measurement: StaticMeasurement) -> StaticMeasureme
 MIXUPS: tuple[Mixup, ...] = (
     Mixup("the cells of the left and the right foot are swapped", _other_foot),
     *(
-        Mixup(f"{what} cells of {where} are swapped", _mirrored(axis, sides))
-        for axis, what in ((0, "heel and toe"), (1, "inner and outer"))
+        Mixup(f"{what} of {where} are swapped", _mirrored(signs, sides))
+        for what, signs in (
+            ("heel and toe cells", (-1.0, 1.0)),
+            ("inner and outer cells", (1.0, -1.0)),
+            ("heel and toe and inner and outer cells", (-1.0, -1.0)),
+        )
         for where, sides in (
-            ("both feet", ("left", "right")),
+            ("both feet", get_args(Side)),
             ("the left foot", ("left",)),
             ("the right foot", ("right",)),
         )
@@ -125,11 +132,9 @@ def _log_likelihood(
     prior = body_prior(robot, spread, mass)
     rows, nuisance, noise = [], [], []
     for measurement in measurements:
-        regressor = regressor_of(robot, measurement.side)
-        turn = regressor.base_rotation(measurement.joint_positions)
-        com = regressor.com(measurement.joint_positions)
-        rows.append(cop_rows(com, slope_of(turn @ measurement.down)))
-        nuisance.append(-float(com[2] @ prior.mean) * slope_change(turn, measurement.down))
+        posture = regressor_of(robot, measurement.side).cop(measurement.joint_positions, measurement.down)
+        rows.append(posture.cop)
+        nuisance.append(-float(posture.com[2] @ prior.mean) * posture.slope_change)
         noise.append(measurement.cop_covariance)
     stack, mounting = np.vstack(rows), np.vstack(nuisance)
     # The masses add up to what was weighed: the prior under this condition.

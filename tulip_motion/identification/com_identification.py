@@ -10,16 +10,16 @@ are found along with the body:
     N_j = -c_z d(sigma)/d(beta),    d(down)/d(beta) = -[down]x
 
 C_j comes from the cells' noise. s is what the model leaves over: encoders, mean attitude, soles that are not quite at
-rest. It is not assumed but taken as large as makes the residuals as likely as they should be: chi^2 = degrees of freedom
-(Mandel and Paule, 1970). The postures must then tell more numbers than there are unknowns; how well they tell them shows
-in the covariance of the CoM of other postures.
+rest. It is not assumed but taken as large as makes the residuals as likely as they should be: chi^2 = degrees of
+freedom (Mandel and Paule, 1970). So the postures have to tell more numbers than there are unknowns; how well they tell
+the body shows in the covariance of the CoM of other postures.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import get_args
 
 import numpy as np
@@ -31,13 +31,7 @@ from tulip_description.robot import Robot
 from tulip_motion.identification.base_parameters import BaseParameters, base_parameters
 from tulip_motion.identification.body_prior import Spread
 from tulip_motion.identification.cell_mixups import check_plausible
-from tulip_motion.identification.com_regressor import (
-    cop_rows,
-    regressor_of,
-    slope_change,
-    slope_of,
-    standard_parameters,
-)
+from tulip_motion.identification.com_regressor import regressor_of, standard_parameters
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.static_measurement import StaticMeasurement
 from tulip_motion.lipm import GRAVITY
@@ -47,6 +41,8 @@ SPARE = 10
 """Numbers measured beyond the unknowns, at least: s is then known to a quarter of itself."""
 ROUNDS = 3
 """c_z in N comes from the round before; it changes N by a hundredth, so this is more than enough."""
+UNKNOWN = 0.1
+"""Standard deviation of the CoM from which on the postures tell nothing of it [m]: the singular set."""
 ON_ONE_FOOT = 0.05
 """A posture whose weight differs by more than this share from the others' was not held on one foot alone."""
 
@@ -63,10 +59,10 @@ class IdentificationSettings:
             that the postures do not tell the body.
     """
 
-    spread: Spread = Spread()
+    spread: Spread = field(default_factory=Spread)
     mount_spread: float = 0.003
     largest_model_error: float = 1e-3
-    largest_uncertainty: float = 5e-3
+    largest_uncertainty: float = 2e-3
 
 
 @dataclass(frozen=True)
@@ -204,16 +200,10 @@ class _Problem:
         settings: IdentificationSettings,
     ) -> None:
         self._mount_spread = settings.mount_spread
-        com, design, turning, down = [], [], [], []
-        for measurement in measurements:
-            regressor = regressor_of(robot, measurement.side)
-            com.append(base.rows(regressor.com(measurement.joint_positions)))
-            turning.append(regressor.base_rotation(measurement.joint_positions))
-            down.append(measurement.down)
-            design.append(cop_rows(com[-1], slope_of(turning[-1] @ measurement.down)))
-        self._com_z = np.array([rows[2] for rows in com])
-        self._rows = np.vstack(design)
-        self._slopes = [slope_change(turn, along) for turn, along in zip(turning, down, strict=True)]
+        postures = [regressor_of(robot, each.side).cop(each.joint_positions, each.down) for each in measurements]
+        self._com_z = np.array([base.rows(posture.com)[2] for posture in postures])
+        self._rows = np.vstack([base.rows(posture.cop) for posture in postures])
+        self._slope_changes = [posture.slope_change for posture in postures]
         self._cop = np.concatenate([measurement.cop for measurement in measurements])
         self._noise = np.array([measurement.cop_covariance for measurement in measurements])
         self._nuisance = np.zeros((len(self._cop), 2))
@@ -224,7 +214,9 @@ class _Problem:
         values = np.append(start[:unknown], (0.0, 0.0))
         for _ in range(ROUNDS):
             heights = self._com_z[:, :unknown] @ values[:unknown] + self._com_z[:, unknown]
-            self._nuisance = np.vstack([-height * slope for height, slope in zip(heights, self._slopes, strict=True)])
+            self._nuisance = np.vstack(
+                [-height * change for height, change in zip(heights, self._slope_changes, strict=True)]
+            )
             error = self._model_error()
             values, covariance, _ = self._least_squares(error)
         return values, covariance, error, self._least_squares(0.0)[2]
@@ -240,14 +232,16 @@ class _Problem:
         spare = len(self._cop) - (self._rows.shape[1] - 1)
 
         def excess(error: float) -> float:
-            return self._least_squares(error)[2] - spare
+            _, _, chi_square = self._least_squares(error)
+            return chi_square - spare
 
         if excess(0.0) <= 0.0:
             return 0.0
         top = 1e-4
         while excess(top) > 0.0:
             top *= 4.0
-        return float(scipy.optimize.brentq(excess, 0.0, top, xtol=1e-7))
+        root: float = scipy.optimize.brentq(excess, 0.0, top, xtol=1e-7)
+        return root
 
     def _least_squares(self, error: float) -> tuple[Array, Array, float]:
         """Return values, covariance and chi^2, with beta's prior, for a model error s."""
@@ -296,9 +290,10 @@ def _check_determined(
             for _ in range(50)
         ]
     )
-    uncertainty = math.sqrt(float(np.mean(np.einsum("ij,jk,ik->i", rows, covariance, rows))))
+    uncertainty = math.sqrt(float(np.mean(np.sum((rows @ covariance) * rows, axis=1))))
     if uncertainty <= settings.largest_uncertainty:
         return
+    size = f"uncertain by {uncertainty * 1e3:.1f} mm" if uncertainty < UNKNOWN else "unknown"
     worst = int(np.argmax(np.diag(covariance)))
     joints = np.array([measurement.joint_positions for measurement in measurements])
     still = [name for name, span in zip(robot.joint_names, np.ptp(joints, axis=0), strict=True) if span < 0.1]
@@ -306,7 +301,7 @@ def _check_determined(
     cause = f"; {', '.join(still)} did not move" if still else ""
     cause += f"; only the {feet.pop()} foot was stood on" if len(feet) == 1 else ""
     raise IdentificationError(
-        f"the postures do not tell the body: the CoM of others would be uncertain by {uncertainty * 1e3:.3g} mm, above"
-        f" all for {base.names[worst]}{cause}; add postures that differ in these joints, on both feet, or fix joints"
+        f"the postures do not tell the body: the CoM of others would be {size}, above all for"
+        f" {base.names[worst]}{cause}; add postures that differ in these joints, on both feet, or fix joints"
         " that stay as they are in the robot's model"
     )

@@ -1,13 +1,13 @@
 """Eq. (2) before its columns are reduced: the CoM is linear in the masses and first moments of the bodies.
 
-The CoM of all bodies in the sole frame of the stance foot s is their mean weighted by mass. With the rotation R_i(q) and
-the origin p_i(q) of body i's frame in the sole frame, known from the kinematics alone,
+The CoM of all bodies in the sole frame of the stance foot s is their mean weighted by mass. With the rotation R_i(q)
+and the origin p_i(q) of body i's frame in the sole frame, known from the kinematics alone,
 
     c_s(q) = sum_i ( mu_i p_i(q) + R_i(q) h_i ) = R_s(q) theta,    mu_i = m_i / M,  h_i = m_i c_i / M        (2a)
 
-theta = (mu_1, h_1, mu_2, h_2, ...) holds the standard parameters, four of each body, and M is the whole robot's mass. A
-robot at rest presses on the ground where the line of gravity through its CoM meets it. On a sole that lies level that is
-(c_x, c_y); with gravity along d in the sole frame it is
+theta = (mu_1, h_1, mu_2, h_2, ...) holds the standard parameters, four of each body, and M is the whole robot's mass.
+A robot at rest presses on the ground where the line of gravity through its CoM meets it. On a sole that lies level that
+is (c_x, c_y); with gravity along d in the sole frame it is
 
     cop = (c_x, c_y) - sigma c_z,    sigma = (d_x, d_y) / d_z                                                 (2b)
 
@@ -17,6 +17,7 @@ which is linear in theta as well.
 from __future__ import annotations
 
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -40,6 +41,21 @@ def standard_parameters(robot: Robot, total_mass: float | None = None) -> Array:
     """
     rows = [(link.mass, *(link.mass * np.array(link.com))) for link in robot.links]
     return np.array(rows).ravel() / (robot.mass if total_mass is None else total_mass)
+
+
+class CopRows(NamedTuple):
+    """What the CoP of one posture depends on.
+
+    Attributes:
+        com: (3, p) rows of the CoM in the sole frame, eq. (2a).
+        cop: (2, p) rows of the CoP, eq. (2b).
+        slope_change: (2, 2) derivative of sigma by beta, the IMU's mounting angles about x and y of base_link: the true
+            direction of gravity is down + beta x down. The CoP changes by -c_z times that.
+    """
+
+    com: Array
+    cop: Array
+    slope_change: Array
 
 
 class ComRegressor:
@@ -78,10 +94,23 @@ class ComRegressor:
             rows[:, body, 1:] = placement.rotation
         return rows.reshape(3, -1)
 
-    def base_rotation(self, joint_positions: Array) -> Array:
-        """Return (3, 3) the rotation from base_link to the sole frame in a posture (n,) [rad]."""
-        self._move(joint_positions)
-        return np.array(self._data.oMf[self._base].rotation)
+    def cop(self, joint_positions: Array, down: Array) -> CopRows:
+        """Return the rows of the CoP, eq. (2b).
+
+        Args:
+            joint_positions: (n,) order of `robot.joint_names` [rad].
+            down: (3,) unit vector of gravity in base_link, as the IMU tells it.
+
+        Raises:
+            ValueError: if joint_positions has a wrong shape.
+        """
+        com = self.com(joint_positions)
+        turn = self._data.oMf[self._base].rotation
+        d = turn @ down
+        slope = d[:2] / d[2]
+        x, y, z = down
+        change = turn @ np.array([[0.0, z], [-z, 0.0], [y, -x]])  # of d: columns e_x x down, e_y x down
+        return CopRows(com, com[:2] - np.outer(slope, com[2]), (change[:2] - np.outer(slope, change[2])) / d[2])
 
     def _move(self, joint_positions: Array) -> None:
         q = np.empty(self._model.nq)
@@ -100,34 +129,3 @@ def regressor_of(robot: Robot, side: Side) -> ComRegressor:
 def com_regressor(robot: Robot, side: Side, joint_positions: Array) -> Array:
     """Return (3, 4 links) R_s(q) of eq. (2a); see `ComRegressor.com`."""
     return regressor_of(robot, side).com(joint_positions)
-
-
-def slope_of(down_in_sole: Array) -> Array:
-    """Return (2,) sigma of eq. (2b), given gravity's direction (3,) in the sole frame."""
-    slope: Array = down_in_sole[:2] / down_in_sole[2]
-    return slope
-
-
-def slope_change(base_rotation: Array, down: Array) -> Array:
-    """Return (2, 2) how sigma of eq. (2b) changes with beta.
-
-    Args:
-        base_rotation: (3, 3) from base_link to the sole frame.
-        down: (3,) gravity in base_link, as the IMU tells it; in truth it is down + beta x down.
-    """
-    x, y, z = down
-    d = base_rotation @ down
-    change = base_rotation @ np.array([[0.0, z], [-z, 0.0], [y, -x]])  # columns e_x x down, e_y x down
-    changed: Array = (change[:2] - np.outer(d[:2] / d[2], change[2])) / d[2]
-    return changed
-
-
-def cop_rows(com_rows: Array, slope: Array) -> Array:
-    """Return (2, k) the rows of the CoP, eq. (2b).
-
-    Args:
-        com_rows: (3, k) rows of the CoM in the sole frame.
-        slope: (2,) sigma.
-    """
-    rows: Array = com_rows[:2] - np.outer(slope, com_rows[2])
-    return rows

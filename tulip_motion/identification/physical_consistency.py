@@ -7,10 +7,10 @@ fit, the most probable one is taken, by Bayes' rule with the robot file as prior
     z = argmin |z|^2 + |theta_b - K (mean + factor z)|^2 by the covariance of theta_b                         (2f)
     such that the masses are those that the cells weigh, in sum, and each at least LIGHTEST of the robot file's
 
-What is identified: the base parameters, which the result reproduces within their covariance. What is prior: how a sum is
-shared among links, as between the masses of thigh and trunk; and all inertias: those of the robot file, each scaled by
-its link's mass and moved with its CoM. So scaled they stay moments that a body can have, and with positive masses all
-pseudo-inertias are positive definite. If no such body reproduces the base parameters, that is refused.
+What is identified: the base parameters, which the result reproduces within their covariance. What is prior: how a sum
+is shared among links, as between the masses of thigh and trunk; and all inertias: those of the robot file, each scaled
+by its link's mass and moved with its CoM. So scaled they stay moments that a body can have, and with positive masses
+all pseudo-inertias are positive definite. If no such body reproduces the base parameters, that is refused.
 """
 
 from __future__ import annotations

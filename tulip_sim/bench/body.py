@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from tulip_description.planar import Pose2D
+from tulip_description.robot import Robot
 from tulip_description.robot_io import JointCommand
 from tulip_motion.interface import MotionMode, WalkCommand, WalkMode
 from tulip_motion.motion import Motion
@@ -27,8 +28,20 @@ class Body:
         ball: tuple[float, float] = (0.0, -2.5),
         parameters: MotionParameters | None = None,
         world: WorldParameters | None = None,
+        true_body: Robot | None = None,
     ) -> None:
-        self.world = World(Scenario(robot=robot, ball=ball, poles=False), world or WorldParameters(), seed)
+        """Put a robot on the field.
+
+        Args:
+            seed: Of everything random.
+            robot: Where base_link stands, seen from above.
+            ball: Where the ball lies [m].
+            parameters: Of motion control.
+            world: Physics and sensors.
+            true_body: Whose masses, CoMs and inertias the robot really has; None for those of the robot file.
+        """
+        scenario = Scenario(robot=robot, ball=ball, poles=False)
+        self.world = World(scenario, world or WorldParameters(), seed, true_body=true_body)
         self.motion = Motion(parameters or MotionParameters(), self.world.robot)
         self.greatest_tilt = 0.0  # [rad]
         self.greatest_efforts = np.zeros(14)  # [N m]
