@@ -33,8 +33,12 @@ class _Legs(Protocol):
 class _Recorder:
     """Moves the simulated robot, with the tick of delay that the graph has, and keeps what its sensors say."""
 
-    def __init__(self, legs: _Legs, robot: Robot, seed: int, parameters: WorldParameters | None) -> None:
-        self.world = World(Scenario(robot=START, ball=(0.0, -2.5), poles=False), parameters, seed, robot=robot)
+    def __init__(
+        self, legs: _Legs, robots: tuple[Robot, Robot], seed: int, parameters: WorldParameters | None
+    ) -> None:
+        true, believed = robots
+        scenario = Scenario(robot=START, ball=(0.0, -2.5), poles=False)
+        self.world = World(scenario, parameters, seed, robot=believed, true_body=true)
         self.readings: list[Sensors] = []
         self._legs = legs
         self._pending: JointCommand | None = None
@@ -73,7 +77,7 @@ def excited_log(
         FellError: if the robot falls.
     """
     motion = ExcitingMotion(excitation, believed)
-    recorder = _Recorder(motion, true, seed, parameters)
+    recorder = _Recorder(motion, (true, believed), seed, parameters)
     while not motion.finished(recorder.world.stamp):
         recorder.tick()
     return recorder.log()
@@ -93,7 +97,7 @@ def walking_log(
         FellError: if the robot falls.
     """
     motion = Motion(MotionParameters(), believed)
-    recorder = _Recorder(motion, true, seed, parameters)
+    recorder = _Recorder(motion, (true, believed), seed, parameters)
     standing = WalkCommand(0, WalkMode.STAND)
     for duration, command in ((REST, standing), (seconds, WalkCommand(0, WalkMode.WALK, velocity)), (2 * REST, standing)):
         motion.command(command)

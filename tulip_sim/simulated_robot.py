@@ -33,6 +33,7 @@ class SimulatedRobot:
         body: Its number in the physics engine.
         index: The engine's number of each link and joint, by name.
         joint_positions, joint_velocities: (n,) after the last step of physics [rad], [rad/s].
+        dry_friction: (n,) of each joint, as drawn [N m].
     """
 
     def __init__(
@@ -74,7 +75,7 @@ class SimulatedRobot:
         self._foot_links = tuple(self.index[sole.link] for sole in robot.soles)
         self._com_in_base = np.array(body.links[0].com)
         n = len(self._joint_indices)
-        self._dry_friction = robot.effort_limits * physics_rng.uniform(*p.joint_friction, n)
+        self.dry_friction = robot.effort_limits * physics_rng.uniform(*p.joint_friction, n)
         self._place(pose)
         self._driver = JointDriver(robot, p.driver, start)
         self._effort_sum, self._effort_count = np.zeros(n), 0
@@ -208,7 +209,7 @@ class SimulatedRobot:
             pybullet.resetJointState(self.body, index, float(angle), 0.0, physicsClientId=client)
 
     def _friction_torque(self) -> Array:
-        torque: Array = self._dry_friction * np.tanh(self.joint_velocities / self._parameters.joint_friction_speed)
+        torque: Array = self.dry_friction * np.tanh(self.joint_velocities / self._parameters.joint_friction_speed)
         return torque
 
     def _body_state(self, now: int) -> BodyState:

@@ -113,12 +113,12 @@ def leg_swing(stance: Side, duration: float = 16.0) -> Excitation:
     outwards = 1.0 if stance is Side.RIGHT else -1.0
     return Excitation(
         duration,
-        torso=(Sines((0.04,), (0.31,)), Sines((0.06,), (0.23,)), STILL),
+        torso=(Sines((0.07, 0.03), (0.31, 0.67)), Sines((0.06,), (0.23,)), STILL),
         drop=0.03,
         stance=stance,
         foot=(
             Sines((0.07, 0.03), (0.71, 1.13)),
-            Sines((0.02 * outwards, 0.015), (0.53, 0.97)),
+            Sines((0.045 * outwards, 0.025), (0.53, 1.03)),
             Sines((0.025,), (0.83,)),
         ),
         foot_yaw=Sines((0.25, 0.1), (0.61, 1.07)),

@@ -33,7 +33,7 @@ PER_LEG = len(LEG_JOINTS) // len(SIDES)
 class FrictionParameters:
     """How friction is looked for."""
 
-    cutoff: float = 10.0  # [Hz] a leg swings at 1 Hz, in a step at 2 with harmonics
+    cutoff: float = 10.0  # [Hz] a leg swings at 1 Hz
     row_rate: float = 50.0  # [1/s] twice the cutoff and a little
     # [rad/s] v_c, over which Coulomb friction builds up; the likeliest is chosen. Dry joints need hardly any; a
     # lubricated gear, or a simulator that cannot step over a jump, more
@@ -102,7 +102,8 @@ def identify_friction(
 
     Args:
         regressor: Of the robot.
-        logs: Recordings in which legs swing; each with some rest, on which `find_biases` depends.
+        logs: Recordings of `leg_swing`, each with some rest, on which `find_biases` depends. The swings of a walk are
+            too short: they end before the filter has forgotten the ground.
         prior: Of the inertial parameters, (10 b,): drawings, or what dynamic identification found.
         parameters: How friction is looked for.
 
@@ -122,7 +123,7 @@ def identify_friction(
     if len(refused) == len(LEG_JOINTS):
         raise ValueError(
             f"no leg joint moved enough while its leg swung; {LEG_JOINTS[0]}: {refused[LEG_JOINTS[0]]}."
-            " Expected a log of walking, or of standing on one foot while the other leg swings"
+            " Expected a log of standing on one foot while the other leg swings"
         )
     limits = regressor.robot.effort_limits
     able = [side for side in range(len(SIDES)) if swings[side].speeds]
