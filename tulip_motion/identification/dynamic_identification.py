@@ -42,6 +42,7 @@ Array = NDArray[np.float64]
 
 CELL_SPREAD = 0.1  # standard deviation of the spreads (D5): the rim of the sole is 10 % farther out than the cells
 LEAST_LEARNED = 5.0  # combinations; the CoM's two coordinates, mass, height and something that moves
+FORCE_ERROR = 0.3  # [N] of the weight of a posture at rest: noise of eight cells over a second, and their resolution
 RANDOM_MOTIONS = 150  # for the structural rank: 450 rows for 150 columns
 
 
@@ -171,20 +172,29 @@ def base_combinations(robot: Robot) -> tuple[Combination, ...]:
     return tuple(found)
 
 
-def static_series(regressor: ZmpRegressor, postures: Sequence[Array], up: Sequence[Array]) -> Array:
-    """Return (t, 3, 10 b + 2) rows (D3) of postures at rest, for comparison.
+def static_covariance(
+    regressor: ZmpRegressor, postures: Sequence[tuple[int, Array]], prior: Prior, cop_error: float
+) -> Array:
+    """Return the covariance (10 b, 10 b) of the standard parameters that postures at rest would leave.
 
     Args:
         regressor: Of the robot.
-        postures: (n,) each [rad].
-        up: (3,) each, upwards in base_link.
+        postures: Stance foot (0 left, 1 right) and joint positions (n,) [rad] of each.
+        prior: Of the standard parameters.
+        cop_error: Standard deviation of the CoP of each posture [m].
     """
-    rows = []
-    for q, direction in zip(postures, up, strict=True):
-        still, none = np.zeros(len(q)), np.zeros(3)
-        body = BodyMotion(q, still, still, none, none, GRAVITY * direction)
-        rows.append(regressor.rows(body, _any_ground(regressor, q, direction)))
-    return np.array(rows)
+    weight = GRAVITY * float(prior.mean[::PER_BODY].sum())
+    deviations = np.array([cop_error * weight, cop_error * weight, FORCE_ERROR])
+    information = np.linalg.inv(prior.covariance)
+    for foot, joints in postures:
+        positions, rotations = regressor.soles(joints)
+        up = rotations[foot][:, 2]
+        still, none = np.zeros(len(joints)), np.zeros(3)
+        body = BodyMotion(joints, still, still, none, none, GRAVITY * up)
+        rows = regressor.rows(body, _ground_at(positions[foot], up))[:, :-SPREADS] / deviations[:, None]
+        information += rows.T @ rows
+    covariance: Array = np.linalg.inv(information)
+    return covariance
 
 
 def knowledge(combinations: Sequence[Combination], covariance: Array) -> Array:
@@ -236,14 +246,13 @@ def _random_rows(regressor: ZmpRegressor, rng: np.random.Generator, moving: bool
     rates, changes = share * rng.uniform(-3.0, 3.0, n), share * rng.uniform(-20.0, 20.0, n)
     turning, change = share * rng.uniform(-2.0, 2.0, 3), share * rng.uniform(-10.0, 10.0, 3)
     force = GRAVITY * up + share * rng.uniform(-3.0, 3.0, 3)
-    rows = regressor.rows(BodyMotion(q, rates, changes, turning, change, force), _any_ground(regressor, q, up))
-    return rows[:, :-SPREADS]
+    ground = _ground_at(regressor.soles(q)[0][0], up)
+    return regressor.rows(BodyMotion(q, rates, changes, turning, change, force), ground)[:, :-SPREADS]
 
 
-def _any_ground(regressor: ZmpRegressor, q: Array, up: Array) -> Ground:
-    """Return the ground of a robot whose CoP lies in its left sole frame; any point spans the same rows."""
-    positions, _ = regressor.soles(q)
-    return Ground(up, horizontal_axes(up), positions[0], positions[0], np.zeros((3, SPREADS)), 1.0)
+def _ground_at(point: Array, up: Array) -> Ground:
+    """Return the ground of a robot whose CoP is some point (3,) of base_link: any spans the same rows."""
+    return Ground(up, horizontal_axes(up), point, point, np.zeros((3, SPREADS)), 1.0)
 
 
 def _can_be(body: Array) -> bool:
