@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from tulip_description.model import floating_model
 from tulip_description.planar import Pose2D
-from tulip_description.robot import LEG_JOINTS, Robot
+from tulip_description.robot import Robot
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_motion.feedforward import feedforward, inverse_dynamics
 from tulip_motion.gait import FootMotion, support_on
+from tulip_motion.head import HeadParameters
 from tulip_motion.interface import Side, Support
 from tulip_motion.inverse_kinematics import LEG_COLUMNS, InverseKinematics, TaskTarget
 from tulip_motion.joint_control import JointGains
@@ -72,7 +73,9 @@ class Excitation:
         drop: What the CoM is lowered by first, to have room upwards [m].
         stance: The foot to stand on, if the other swings.
         foot: Of the foot that swings: forward, left, up [m].
+        foot_rise: How far it is lifted beyond `LIFT_HEIGHT` [m].
         foot_yaw: Its turn [rad].
+        head: Pan and tilt [rad].
         com_ahead: CoM ahead of the stance ankle while the other foot swings [m]: the middle of the sole.
     """
 
@@ -82,7 +85,9 @@ class Excitation:
     drop: float = 0.0
     stance: Side | None = None
     foot: Axes = (STILL, STILL, STILL)
+    foot_rise: float = 0.0
     foot_yaw: Sines = STILL
+    head: tuple[Sines, Sines] = (STILL, STILL)
     com_ahead: float = 0.04
 
     @property
@@ -92,41 +97,54 @@ class Excitation:
         return 2.0 * (REST + SHIFT_TIME) + lifting + self.duration
 
 
-SQUATS = Excitation(20.0, com=(STILL, STILL, Sines((0.035, 0.02), (0.31, 0.53))), drop=0.06)
+LOOKING_ROUND = (Sines((0.9, 0.3), (0.17, 0.43)), Sines((0.5, 0.15), (0.13, 0.49)))
+SQUATS = Excitation(
+    20.0, com=(STILL, STILL, Sines((0.035, 0.02), (0.31, 0.53))), drop=0.06, head=LOOKING_ROUND
+)
 SWAYS = Excitation(
-    24.0, com=(Sines((0.020, 0.010), (0.23, 0.61)), Sines((0.035, 0.015), (0.29, 0.47)), STILL), drop=0.02
+    24.0,
+    com=(Sines((0.020, 0.010), (0.23, 0.61)), Sines((0.035, 0.015), (0.29, 0.47)), STILL),
+    drop=0.02,
+    head=LOOKING_ROUND,
 )
 LEANS = Excitation(
     24.0,
     com=(Sines((0.010,), (0.37,)), Sines((0.015,), (0.41,)), Sines((0.015,), (0.59,))),
     torso=(
         Sines((0.10, 0.04), (0.26, 0.67)),
-        Sines((0.16, 0.06), (0.33, 0.73)),
-        Sines((0.12, 0.05), (0.19, 0.57)),
+        Sines((0.20, 0.06), (0.33, 0.73)),
+        Sines((0.15, 0.05), (0.19, 0.57)),
     ),
     drop=0.04,
+    head=LOOKING_ROUND,
 )
 
 
-def leg_swing(stance: Side, duration: float = 16.0) -> Excitation:
-    """Return the swing of one leg while the robot stands on the other: fast enough to tell friction that grows."""
+def leg_swing(stance: Side, duration: float = 20.0) -> Excitation:
+    """Return the swing of one leg while the robot stands on the other.
+
+    Fast enough to tell Coulomb from viscous friction, and slowly through as much of the leg's range as balance allows,
+    since its weight shows where it hangs far out.
+    """
     outwards = 1.0 if stance is Side.RIGHT else -1.0
     return Excitation(
         duration,
-        torso=(Sines((0.07, 0.03), (0.31, 0.67)), Sines((0.06,), (0.23,)), STILL),
+        torso=(Sines((0.09, 0.03), (0.31, 0.67)), Sines((0.15, 0.03), (0.21, 0.59)), STILL),
         drop=0.03,
         stance=stance,
         foot=(
-            Sines((0.07, 0.03), (0.71, 1.13)),
-            Sines((0.045 * outwards, 0.025), (0.53, 1.03)),
-            Sines((0.025,), (0.83,)),
+            Sines((0.14, 0.07, 0.02), (0.11, 0.71, 1.13)),
+            Sines((0.05 * outwards, 0.04, 0.02), (0.17, 0.53, 1.03)),
+            Sines((0.03,), (0.83,)),
         ),
-        foot_yaw=Sines((0.25, 0.1), (0.61, 1.07)),
+        foot_rise=0.06,
+        foot_yaw=Sines((0.35, 0.1), (0.61, 1.07)),
+        head=LOOKING_ROUND,
     )
 
 
 class ExcitingMotion:
-    """Commands the legs through one excitation, from a posture with both feet flat, and back to it."""
+    """Commands legs and head through one excitation, from a posture with both feet flat, and back to it."""
 
     def __init__(self, excitation: Excitation, robot: Robot, parameters: MotionParameters | None = None) -> None:
         """Make the motion for a robot as it is believed to be."""
@@ -136,6 +154,8 @@ class ExcitingMotion:
         limits = robot.position_limits[:, :12]
         self._kinematics = InverseKinematics(model, p.clik_gain_position, p.clik_gain_orientation, limits)
         self._gains = JointGains(p)
+        self._head_parameters = HeadParameters()
+        self._names = robot.joint_names
         self._sequence = 0
         self._start: int | None = None
 
@@ -149,10 +169,11 @@ class ExcitingMotion:
         return self._start is not None and (stamp - self._start) * 1e-9 >= self._excitation.total_time
 
     def tick(self, sensors: Sensors) -> JointCommand:
-        """Return the command for the legs that answers one reading of the sensors; the first begins the motion."""
+        """Return the command for all joints that answers one reading of the sensors; the first begins the motion."""
         if self._start is None:
             self._start = sensors.stamp
             self._begin(sensors.joint_positions[:12])
+            self._head_start = sensors.joint_positions[12:].copy()
         t = (sensors.stamp - self._start) * 1e-9
         kinematics, stance = self._kinematics, self._stance
         kinematics.update_jacobian(stance)
@@ -163,9 +184,19 @@ class ExcitingMotion:
         self._damp(effort, sensors.imu_angular_velocity, share)
         kinematics.integrate(self._parameters.control_period, self._feet[stance])
         gains = self._gains.of(support_on(stance) if self._lifted(t) > 0.0 else Support.DOUBLE, open_loop=True)
+        head, head_rate = self._head(t)
+        none = np.zeros(len(head))
         self._sequence += 1
-        position, velocity = kinematics.joint_positions.copy(), kinematics.joint_velocities.copy()
-        return JointCommand(self._sequence, sensors.stamp, LEG_JOINTS, position, velocity, effort, *gains)
+        return JointCommand(
+            self._sequence,
+            sensors.stamp,
+            self._names,
+            np.concatenate([kinematics.joint_positions, head]),
+            np.concatenate([kinematics.joint_velocities, head_rate]),
+            np.concatenate([effort, none]),
+            np.concatenate([gains[0], none + self._head_parameters.stiffness]),
+            np.concatenate([gains[1], none + self._head_parameters.damping]),
+        )
 
     def _begin(self, joint_positions: Array) -> None:
         """Take the posture that the robot has, its left sole level at the origin, as the one to return to."""
@@ -211,17 +242,31 @@ class ExcitingMotion:
         for side, share in ((Side.LEFT, 1.0 - right_share), (Side.RIGHT, right_share)):
             effort[LEG_COLUMNS[side]][4:6] += share * pitch * about_y, share * roll * about_x
 
+    def _head(self, t: float) -> tuple[Array, Array]:
+        """Return the angles and rates of the head's joints, if there are any, at a time [s]."""
+
+        def angles(at: float) -> Array:
+            since = at - self._excited_from
+            sines = self._excitation.head[: len(self._head_start)]
+            return self._head_start + self._fade(since) * np.array([sine.at(since) for sine in sines])
+
+        return angles(t), (angles(t + HALF_STEP) - angles(t - HALF_STEP)) / (2.0 * HALF_STEP)
+
+    def _fade(self, since: float) -> float:
+        """Return the share of the sines, 0 to 1, at a time since they began [s]."""
+        return _rise(since / FADE_TIME) * _rise((self._excitation.duration - since) / FADE_TIME)
+
     def _places(self, t: float) -> tuple[Array, Array, Array, float]:
         """Return CoM (3,) [m], torso (3, 3), the foot that may swing (3,) [m] and its yaw [rad] at a time [s]."""
         e = self._excitation
         since = t - self._excited_from
-        fade = _rise(since / FADE_TIME) * _rise((e.duration - since) / FADE_TIME)
+        fade = self._fade(since)
         com = self._com + fade * np.array([axis.at(since) for axis in e.com])
         com += self._shifted(t) * (self._com_shift - np.array([0.0, 0.0, e.drop]))
         torso = pin.exp3(fade * np.array([axis.at(since) for axis in e.torso])) @ self._torso
         resting = self._feet[self._stance.other]
         foot = np.array([resting.x, resting.y, 0.0]) + fade * np.array([axis.at(since) for axis in e.foot])
-        foot[2] += self._lifted(t) * LIFT_HEIGHT
+        foot[2] += self._lifted(t) * (LIFT_HEIGHT + e.foot_rise)
         return com, torso, foot, resting.yaw + fade * e.foot_yaw.at(since)
 
     @property
