@@ -33,9 +33,7 @@ class _Legs(Protocol):
 class _Recorder:
     """Moves the simulated robot, with the tick of delay that the graph has, and keeps what its sensors say."""
 
-    def __init__(
-        self, legs: _Legs, robots: tuple[Robot, Robot], seed: int, parameters: WorldParameters | None
-    ) -> None:
+    def __init__(self, legs: _Legs, robots: tuple[Robot, Robot], seed: int, parameters: WorldParameters | None) -> None:
         true, believed = robots
         scenario = Scenario(robot=START, ball=(0.0, -2.5), poles=False)
         self.world = World(scenario, parameters, seed, robot=believed, true_body=true)
@@ -99,7 +97,8 @@ def walking_log(
     motion = Motion(MotionParameters(), believed)
     recorder = _Recorder(motion, (true, believed), seed, parameters)
     standing = WalkCommand(0, WalkMode.STAND)
-    for duration, command in ((REST, standing), (seconds, WalkCommand(0, WalkMode.WALK, velocity)), (2 * REST, standing)):
+    walking = WalkCommand(0, WalkMode.WALK, velocity)
+    for duration, command in ((REST, standing), (seconds, walking), (2 * REST, standing)):
         motion.command(command)
         for _ in range(round(duration * 1000 / TICK)):
             recorder.tick()

@@ -2,7 +2,8 @@
 
 The paper plans it: "to perform dynamic experiments and fit model parameters in the equations of the Zero Moment Point
 (ZMP) position to experimental data of the CoP". The equations are (D3), one set for all recordings; of all parameters
-that explain them, the most probable with the robot file as prior (D8) is taken, by (D7) of `correlated_fit`.
+that explain them, the most probable with the robot file as prior (D8) is taken, by (D7) of `correlated_fit`, and of the
+bodies that can be the nearest to it, (D9).
 
 Beside what static postures tell, accelerations weigh the robot (its mass in kg, not only shares of it), show how high
 the CoM lies without tilting it, and move moments of inertia. `knowledge` says in numbers what a recording told.
@@ -22,9 +23,10 @@ from numpy.typing import NDArray
 from tulip_description.model import floating_model
 from tulip_description.robot import Robot
 from tulip_motion.identification.base_parameters import reduce_columns
-from tulip_motion.identification.correlated_fit import Fit, Prior, Series, fit
+from tulip_motion.identification.correlated_fit import Fit, Prior, fit
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.inertial_prior import inertial_prior
+from tulip_motion.identification.realizable_parameters import can_be, most_probable_bodies
 from tulip_motion.identification.zmp_regressor import (
     PARAMETER_NAMES,
     PER_BODY,
@@ -33,6 +35,7 @@ from tulip_motion.identification.zmp_regressor import (
     Ground,
     ZmpRegressor,
     horizontal_axes,
+    parameters_of,
     with_parameters,
 )
 from tulip_motion.identification.zmp_rows import ZmpRows
@@ -54,7 +57,8 @@ class DynamicIdentification:
         robot: As it was believed to be; gives the kinematics.
         parameters: (10 b,) standard parameters of the moving bodies, see `ZmpRegressor.body_names`.
         spreads: (2,) of the cells, along and across the soles.
-        covariance: (10 b + 2, 10 b + 2) of both.
+        covariance: (10 b + 2, 10 b + 2) of both, by the linear equations.
+        moved: The bodies, by the link on their joint, that as the linear equations have them cannot be; see (D9).
         fit: Residuals, their correlation, and how many combinations were learned.
     """
 
@@ -62,6 +66,7 @@ class DynamicIdentification:
     parameters: Array
     spreads: Array
     covariance: Array
+    moved: tuple[str, ...]
     fit: Fit
 
     @property
@@ -86,16 +91,6 @@ class DynamicIdentification:
         """Return the floating Pinocchio model with these parameters."""
         return with_parameters(floating_model(self.robot), self.parameters)
 
-    def impossible_bodies(self) -> tuple[str, ...]:
-        """Return the bodies that cannot be, by the link on their joint: their pseudo-inertia is not positive definite.
-
-        A light body whose inertia the motion hardly showed may get one: the linear equations know of no bounds. The
-        model then still predicts what was learned, the ZMP; do not simulate with it.
-        """
-        names = ZmpRegressor(self.robot).body_names
-        bodies = zip(names, self.parameters.reshape(-1, PER_BODY), strict=True)
-        return tuple(name for name, body in bodies if not _can_be(body))
-
 
 def identify_dynamics(
     regressor: ZmpRegressor, recordings: Sequence[ZmpRows], prior: Prior | None = None
@@ -103,7 +98,7 @@ def identify_dynamics(
     """Find the inertial parameters of a robot.
 
     Args:
-        regressor: Of the robot as it is believed to be.
+        regressor: Of the robot as it is believed to be; its bodies can be.
         recordings: Squats, sways, leans, swings of the legs, walks.
         prior: Of the standard parameters (10 b,); None for the robot file with the usual spread.
 
@@ -126,9 +121,14 @@ def identify_dynamics(
             f" {LEAST_LEARNED:.0f} or more: add squats, sways and leans of larger amplitude"
         )
     parameters, spreads = found.parameters[:inertial], found.parameters[inertial:]
-    if parameters[::PER_BODY].sum() <= 0.0:
-        raise IdentificationError("the robot's mass comes out negative; the cells' signs are wrong or cells are swapped")
-    return DynamicIdentification(regressor.robot, parameters, spreads, found.covariance, found)
+    moved = tuple(
+        name
+        for name, body in zip(regressor.body_names, parameters.reshape(-1, PER_BODY), strict=True)
+        if not can_be(body)
+    )
+    start = parameters_of(floating_model(regressor.robot))
+    parameters = most_probable_bodies(parameters, found.covariance[:inertial, :inertial], start)
+    return DynamicIdentification(regressor.robot, parameters, spreads, found.covariance, moved, found)
 
 
 class Combination(NamedTuple):
@@ -151,8 +151,8 @@ class Combination(NamedTuple):
 def base_combinations(robot: Robot) -> tuple[Combination, ...]:
     """Return the independent combinations of standard parameters in (D3), reduced as those of the CoM are.
 
-    What a body has in common with its parent goes to the parent, as Gautier has it: its mass, its first moment along the
-    joint's axis, and one of its two moments of inertia across that axis.
+    What a body has in common with its parent goes to the parent, as Gautier has it: its mass, its first moment along
+    the joint's axis, and one of its two moments of inertia across that axis.
     """
     regressor = ZmpRegressor(robot)
     rng = np.random.default_rng(0)
@@ -208,7 +208,8 @@ def com_error(identified: Any, true: Any, postures: Sequence[tuple[int, Array]])
     """Return (postures, 3) error of the CoM in the sole frame of a foot [m], by two floating models.
 
     Args:
-        identified, true: Floating Pinocchio models of one kinematics.
+        identified: Floating Pinocchio model.
+        true: Another of the same kinematics.
         postures: Stance foot (0 left, 1 right) and joint positions (n,) [rad] of each.
     """
     errors = []
@@ -229,7 +230,8 @@ def _preference(robot: Robot) -> list[int]:
     for joint in robot.moving:
         axis = int(np.abs(joint.axis).argmax())
         shared.append({"m", moments[axis], second[axis]})
-    own, common = [], []
+    own: list[int] = []
+    common: list[int] = []
     for body, names in enumerate(shared):
         for kind, name in enumerate(PARAMETER_NAMES):
             (common if name in names else own).append(PER_BODY * body + kind)
@@ -253,12 +255,3 @@ def _random_rows(regressor: ZmpRegressor, rng: np.random.Generator, moving: bool
 def _ground_at(point: Array, up: Array) -> Ground:
     """Return the ground of a robot whose CoP is some point (3,) of base_link: any spans the same rows."""
     return Ground(up, horizontal_axes(up), point, point, np.zeros((3, SPREADS)), 1.0)
-
-
-def _can_be(body: Array) -> bool:
-    """Return whether a body (10,) has positive mass and a positive definite pseudo-inertia."""
-    mass, x, y, z, xx, xy, yy, xz, yz, zz = body.tolist()
-    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    moments = np.array([[x], [y], [z]])
-    pseudo = np.block([[0.5 * np.trace(inertia) * np.eye(3) - inertia, moments], [moments.T, np.array([[mass]])]])
-    return bool(np.linalg.eigvalsh(pseudo)[0] > 0.0)

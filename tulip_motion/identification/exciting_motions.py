@@ -98,9 +98,7 @@ class Excitation:
 
 
 LOOKING_ROUND = (Sines((0.9, 0.3), (0.17, 0.43)), Sines((0.5, 0.15), (0.13, 0.49)))
-SQUATS = Excitation(
-    20.0, com=(STILL, STILL, Sines((0.035, 0.02), (0.31, 0.53))), drop=0.06, head=LOOKING_ROUND
-)
+SQUATS = Excitation(20.0, com=(STILL, STILL, Sines((0.035, 0.02), (0.31, 0.53))), drop=0.06, head=LOOKING_ROUND)
 SWAYS = Excitation(
     24.0,
     com=(Sines((0.020, 0.010), (0.23, 0.61)), Sines((0.035, 0.015), (0.29, 0.47)), STILL),

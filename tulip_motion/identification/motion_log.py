@@ -79,7 +79,8 @@ class MotionLog:
     @property
     def times(self) -> Array:
         """(t,) since the first reading [s]."""
-        return self.period * np.arange(len(self.joint_positions))
+        times: Array = self.period * np.arange(len(self.joint_positions), dtype=float)
+        return times
 
 
 class SmoothMotion(NamedTuple):
@@ -132,7 +133,7 @@ def smooth(log: MotionLog, cutoff: float) -> SmoothMotion:
         return low
 
     def rate_of_change(signal: Array) -> Array:
-        slope: Array = np.gradient(signal, log.period, axis=0, edge_order=2)
+        slope: Array = np.asarray(np.gradient(signal, log.period, axis=0, edge_order=2), dtype=float)
         return slope
 
     q, turning = passed(log.joint_positions), passed(log.angular_velocity)

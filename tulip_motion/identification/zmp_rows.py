@@ -67,7 +67,8 @@ class ZmpRows(NamedTuple):
     def error(self, parameters: Array) -> Array:
         """Return (t, 2) way from the measured CoP to the ZMP that parameters (10 b + 2,) predict [m], eq. (D4)."""
         along, left, force = np.moveaxis(self.equations.design @ parameters, 1, 0)
-        return np.stack([along, left], axis=1) / force[:, None]
+        away: Array = np.stack([along, left], axis=1) / force[:, None]
+        return away
 
 
 def zmp_rows(regressor: ZmpRegressor, log: MotionLog, parameters: RowParameters | None = None) -> ZmpRows:
@@ -135,7 +136,9 @@ def find_biases(
         )
     chosen = np.flatnonzero(still)[::5]  # at rest the next readings say the same
     rotations = [regressor.soles(motion.q[t])[1] for t in chosen]
-    normals = [cells.sum(axis=1) @ soles[:, :, 2] for cells, soles in zip(motion.foot_cells[chosen], rotations, strict=True)]
+    normals = [
+        cells.sum(axis=1) @ soles[:, :, 2] for cells, soles in zip(motion.foot_cells[chosen], rotations, strict=True)
+    ]
     tilt = _least_turn(_unit(motion.up[chosen].mean(axis=0)), _unit(np.mean(normals, axis=0)))
     level = log.base_rotations @ tilt.T
     felt = np.einsum("tij,tj->i", level, log.specific_force) / len(level)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tulip_description.model import floating_model
 from tulip_description.posture import standing_posture
 from tulip_description.robot import SIDES, Robot, load_robot
+from tulip_description.short_numbers import significant
 from tulip_motion.identification.dynamic_identification import (
     DynamicIdentification,
     base_combinations,
@@ -117,7 +118,7 @@ def measure(seed: int) -> Row:
     row["mass error [kg]"] = [round(believed.mass - true.mass, 3), round(mass - true.mass, 3), round(deviation, 3)]
     row["combinations learned"] = round(found.fit.learned, 1)
     row["spreads"] = [round(float(spread), 3) for spread in found.spreads]
-    row["impossible bodies"] = list(found.impossible_bodies())
+    row["bodies moved"] = list(found.moved)
     row["deviations"] = _deviations(regressor, found, postures[:STATIC_POSTURES])
     row["friction"] = _friction(regressor, logs, found, seed)
     return row
@@ -142,7 +143,8 @@ def _deviations(
     combinations = base_combinations(regressor.robot)
     static = static_covariance(regressor, postures, prior, STATIC_ERROR)
     columns = [knowledge(combinations, covariance) for covariance in (prior.covariance, static, found.covariance)]
-    return {c.name: [float(f"{value:.3g}") for value in values] for c, *values in zip(combinations, *columns, strict=True)}
+    table = np.stack(columns, axis=1)
+    return {c.name: significant(row).tolist() for c, row in zip(combinations, table, strict=True)}
 
 
 def _friction(
@@ -169,17 +171,17 @@ def _rms(errors: Array) -> float:
 def summarize(rows: list[Row]) -> list[str]:
     """Return tables."""
     lines = [
-        f"{len(rows)} robots whose link masses (+-20 %) and CoMs (+-2 cm on each axis) were secretly changed. Squats, sways,"
-        " leans, a swing of each leg, and two walks of"
-        f" {WALK_TIME:.0f} s; sensors with noise. ZMP: root mean square distance to the measured CoP, predicted by the wrong"
-        " model, by the one identified from the *other* motions (for walks: no walk), and by the true one, which is the"
-        " floor.",
+        f"{len(rows)} robots whose link masses (+-20 %) and CoMs (+-2 cm on each axis) were secretly changed. Squats,"
+        f" sways, leans, a swing of each leg, and two walks of {WALK_TIME:.0f} s; sensors with noise. ZMP: root mean"
+        " square distance to the measured CoP, predicted by the wrong model, by the one identified from the *other*"
+        " motions (for walks: from none), and by the true one, which is the floor.",
         "",
         "| motion | wrong model | identified | true |",
         "| --- | --- | --- | --- |",
     ]
     for name in TESTED:
-        cells = [_range([row[f"ZMP {name}, {model} [mm]"] for row in rows]) for model in ("wrong", "identified", "true")]
+        models = ("wrong", "identified", "true")
+        cells = [_range([row[f"ZMP {name}, {model} [mm]"] for row in rows]) for model in models]
         lines.append(f"| {name} | {' | '.join(cells)} |")
     lines += [
         "",
@@ -192,9 +194,9 @@ def summarize(rows: list[Row]) -> list[str]:
         before, after = zip(*(row[name] for row in rows), strict=True)
         lines.append(f"| {name[:-5]} | {_range(before)} | {_range(after)} |")
     masses = [row["mass error [kg]"] for row in rows]
-    before, after = [abs(mass[0]) for mass in masses], [abs(mass[1]) for mass in masses]
+    of_file, found = [abs(mass[0]) for mass in masses], [1e3 * abs(mass[1]) for mass in masses]
     lines += [
-        f"| mass | {min(before):.2f}-{max(before):.2f} kg | {1e3 * min(after):.0f}-{1e3 * max(after):.0f} g |",
+        f"| mass | {min(of_file):.2f}-{max(of_file):.2f} kg | {min(found):.0f}-{max(found):.0f} g |",
         "",
         *_learned(rows),
         "",
@@ -205,7 +207,8 @@ def summarize(rows: list[Row]) -> list[str]:
     ]
     parts = dict.fromkeys(name.split("_", 1)[1] for row in rows for name in row["friction"])
     for part in parts:
-        table = np.array([row["friction"][f"{side}_{part}"] for row in rows for side in SIDES if f"{side}_{part}" in row["friction"]])
+        legs = [row["friction"].get(f"{side}_{part}") for row in rows for side in SIDES]
+        table = np.array([leg for leg in legs if leg is not None])
         error, stated = (np.sqrt((values**2).mean()) for values in (table[:, 1] - table[:, 0], table[:, 2]))
         lines.append(
             f"| {part.replace('_', ' ')} | {table[:, 0].min():.3f}-{table[:, 0].max():.3f} N m | {error:.3f} N m"
@@ -243,7 +246,7 @@ def _range(values: Sequence[float]) -> str:
 def draw(rows: Sequence[Row], path: Path) -> None:
     """Draw measured and predicted CoP of the first robot in a squat, a sway and a walk, before and after."""
     seed = int(rows[0]["seed"])
-    true, believed = bodies(seed)
+    _, believed = bodies(seed)
     regressor = ZmpRegressor(believed)
     recorded = {name: zmp_rows(regressor, log) for name, log in recordings(seed).items()}
     figure = Figure(figsize=(12.0, 8.0), layout="constrained")
@@ -257,7 +260,8 @@ def draw(rows: Sequence[Row], path: Path) -> None:
                 ("robot file", "tab:red", believed_parameters(believed)),
                 ("identified from other motions", "tab:green", found.all_parameters),
             ):
-                plot.plot(part.times[shown], 1e3 * part.zmp(parameters)[shown, axis], colour, linewidth=1.2, label=label)
+                zmp = 1e3 * part.zmp(parameters)[shown, axis]
+                plot.plot(part.times[shown], zmp, colour, linewidth=1.2, label=label)
             plot.set_ylabel(f"{direction} of the soles' mean [mm]")
             plot.set_title(name)
             plot.grid(alpha=0.3)
