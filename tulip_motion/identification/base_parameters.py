@@ -76,7 +76,7 @@ def reduce_columns(stack: Array, preference: Sequence[int]) -> Reduction:
             directions = np.column_stack((directions, rest / size))
     if len(kept) != rank:
         raise ValueError(f"{len(kept)} columns are independent one by one, but the rank is {rank}; expected the same")
-    combinations: Array = np.linalg.lstsq(stack[:, kept], stack, rcond=None)[0]
+    combinations = np.asarray(np.linalg.lstsq(stack[:, kept], stack, rcond=None)[0], dtype=np.float64)
     combinations[np.abs(combinations) < DEPENDENT] = 0.0
     return Reduction(tuple(kept), combinations)
 

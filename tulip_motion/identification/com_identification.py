@@ -147,13 +147,13 @@ def identify_com(
     problem = _Problem(robot, base, measurements, p)
     start = base.combinations @ standard_parameters(robot)
     values, covariance, error, chi_square = problem.solve(start)
-    _check_determined(robot, base, measurements, covariance[:unknown, :unknown], p)
     if error > p.largest_model_error:
         raise IdentificationError(
             f"the postures do not fit one rigid body: {error * 1e3:.1f} mm is left over beside the noise, more than"
             f" {p.largest_model_error * 1e3:.1f} mm; look for cells or encoders that are off, a foot that slipped or"
             " stood on its edge, or a load that moved or was changed on the way"
         )
+    _check_determined(robot, base, measurements, covariance[:unknown, :unknown], p)
     full = np.zeros((unknown + 1, unknown + 1))
     full[:unknown, :unknown] = covariance[:unknown, :unknown]
     return ComIdentification(
@@ -200,6 +200,7 @@ class _Problem:
         settings: IdentificationSettings,
     ) -> None:
         self._mount_spread = settings.mount_spread
+        self._unknown = len(base.columns) - 1
         postures = [regressor_of(robot, each.side).cop(each.joint_positions, each.down) for each in measurements]
         self._com_z = np.array([base.rows(posture.com)[2] for posture in postures])
         self._rows = np.vstack([base.rows(posture.cop) for posture in postures])
@@ -210,7 +211,7 @@ class _Problem:
 
     def solve(self, start: Array) -> tuple[Array, Array, float, float]:
         """Return the unknowns with beta, their covariance, s, and chi^2 without s; start is (r,) theta_b for c_z."""
-        unknown = self._rows.shape[1] - 1
+        unknown = self._unknown
         values = np.append(start[:unknown], (0.0, 0.0))
         for _ in range(ROUNDS):
             heights = self._com_z[:, :unknown] @ values[:unknown] + self._com_z[:, unknown]
@@ -223,25 +224,23 @@ class _Problem:
 
     def residuals(self, values: Array) -> Array:
         """Return (postures, 2) what the fit leaves of the CoP [m]."""
-        unknown = self._rows.shape[1] - 1
+        unknown = self._unknown
         left: Array = self._cop - self._rows @ np.append(values[:unknown], 1.0) - self._nuisance @ values[unknown:]
         return left.reshape(-1, 2)
 
     def _model_error(self) -> float:
         """Return s that makes chi^2 as large as the numbers measured beyond the unknowns; 0 if it is smaller anyway."""
-        spare = len(self._cop) - (self._rows.shape[1] - 1)
+        spare = len(self._cop) - self._unknown
 
         def excess(error: float) -> float:
-            _, _, chi_square = self._least_squares(error)
-            return chi_square - spare
+            return self._least_squares(error)[2] - spare
 
         if excess(0.0) <= 0.0:
             return 0.0
         top = 1e-4
         while excess(top) > 0.0:
             top *= 4.0
-        root: float = scipy.optimize.brentq(excess, 0.0, top, xtol=1e-7)
-        return root
+        return float(scipy.optimize.brentq(excess, 0.0, top, xtol=1e-7))
 
     def _least_squares(self, error: float) -> tuple[Array, Array, float]:
         """Return values, covariance and chi^2, with beta's prior, for a model error s."""

@@ -34,6 +34,9 @@ LIGHTEST = 0.1
 """Share of its mass in the robot file that a link keeps at least."""
 WEIGHED = 1e-6
 """Share of the whole mass to which the links' masses add up to it."""
+FARTHEST = 10.0
+"""Spreads of the CoM by which a link's may lie from where the robot file has it: a light link's moves most."""
+REMEDY = "else look for a cell or an encoder that is off"
 IMPROBABLE = 1e-6
 """Probability of base parameters, given the best body, below which no body is taken to have them."""
 
@@ -73,18 +76,25 @@ def most_probable_body(found: ComIdentification) -> WholeBody:
     sizes = np.diag(prior.factor)[::PER_BODY]
     lower[::PER_BODY] = (LIGHTEST - 1.0) * prior.mean[::PER_BODY] / sizes
     z = lsq_linear(
-        np.vstack((told, np.eye(count))), np.append(wanted, np.zeros(count)), bounds=(lower, np.inf), tol=1e-14
+        np.vstack((told, np.eye(count))), np.append(wanted, np.zeros(count)), bounds=(lower, np.inf), method="bvls"
     ).x
     misfit = float(np.sum((told @ z - wanted)[:-1] ** 2))
     if chi2.sf(misfit, len(combinations)) < IMPROBABLE:
         raise IdentificationError(
             f"no body with positive masses near the robot file's has the base parameters that were identified (chi^2"
             f" {misfit:.0f} for {len(combinations)}): state a larger spread of masses and CoMs if the robot was"
-            " rebuilt, else look for a cell or an encoder that is off"
+            f" rebuilt, {REMEDY}"
         )
-    theta = (prior.mean + prior.factor @ z).reshape(-1, PER_BODY) * found.mass
+    body = _with_bodies(robot, (prior.mean + prior.factor @ z).reshape(-1, PER_BODY) * found.mass)
+    for link, was in zip(body.links, robot.links, strict=True):
+        shift = float(np.linalg.norm(np.subtract(link.com, was.com)))
+        if shift > FARTHEST * found.settings.spread.com:
+            raise IdentificationError(
+                f"the base parameters that were identified put the CoM of {link.name} {shift:.2f} m from where the"
+                f" robot file has it: state a larger spread of CoMs if the robot was rebuilt, {REMEDY}"
+            )
     left = np.diag(np.linalg.inv(told.T @ told + np.eye(count)))
-    return WholeBody(_with_bodies(robot, theta), (1.0 - left).reshape(-1, PER_BODY), misfit)
+    return WholeBody(body, (1.0 - left).reshape(-1, PER_BODY), misfit)
 
 
 def _with_bodies(robot: Robot, theta: Array) -> Robot:

@@ -15,6 +15,8 @@ from tulip_sim.parameters import SensorParameters
 from tulip_sim.sensors import GRAVITY, cell_forces
 
 Array = NDArray[np.float64]
+Held = list[tuple[Side, Array]]
+"""Stance foot and true joint positions (n,) [rad] of postures."""
 READINGS = 250
 SOLE_TILT = 0.001  # [rad] the floor is not quite level, nor the sole quite flat
 
@@ -41,18 +43,17 @@ def base_rotation(robot: Robot, side: Side, joints: Array) -> Array:
 
 
 def random_posture(robot: Robot, side: Side, rng: np.random.Generator) -> Array:
-    """Draw a posture on one foot: knees bent, trunk within 0.35 rad of upright, believed CoM above the middle sole."""
+    """Draw a posture on one foot: knees bent, trunk within 0.8 rad of upright, believed CoM above the middle sole."""
     low, high = robot.position_limits
     stance = 0 if side == "left" else 6
     swing, ankle = 6 - stance, [stance + 4, stance + 5]
     out = 1.0 if side == "left" else -1.0  # a positive hip roll takes the right leg inwards
-    regular = robot
     for _ in range(2000):
         joints = np.zeros(len(robot.joint_names))
         for leg in (stance, swing):
-            joints[leg : leg + 6] = rng.uniform(-1.0, 1.0, 6) * (0.5, 0.3, 0.5, 0.5, 0.5, 0.5)
+            joints[leg : leg + 6] = rng.uniform(-1.0, 1.0, 6) * (0.5, 0.3, 0.9, 0.9, 0.5, 0.5)
             joints[leg + 2] -= 0.5
-            joints[leg + 3] += 0.9
+            joints[leg + 3] += 1.0
         joints[swing + 1] -= out * 0.2
         joints[stance + 4] = -joints[stance + 2] - joints[stance + 3]
         for index, name in enumerate(robot.joint_names):
@@ -60,25 +61,25 @@ def random_posture(robot: Robot, side: Side, rng: np.random.Generator) -> Array:
                 joints[index] = rng.uniform(0.9 * low[index], 0.9 * high[index])
         target = np.array([rng.uniform(0.01, 0.08), rng.uniform(-0.03, 0.03)])
         for _ in range(15):
-            error = target - com_by_pinocchio(regular, side, joints)[:2]
+            error = target - com_by_pinocchio(robot, side, joints)[:2]
             steps = []
             for index in ankle:
                 moved = joints.copy()
                 moved[index] += 1e-5
-                steps.append((com_by_pinocchio(regular, side, moved)[:2] - target + error) / 1e-5)
+                steps.append((com_by_pinocchio(robot, side, moved)[:2] - target + error) / 1e-5)
             change = np.linalg.solve(np.array(steps).T, error)
             joints[ankle] += np.clip(change, -0.2, 0.2)
             if np.abs(error).max() < 1e-6:
                 break
         else:
             continue
-        upright = base_rotation(robot, side, joints)[2, 2] > math.cos(0.35)
+        upright = base_rotation(robot, side, joints)[2, 2] > math.cos(0.8)
         if upright and (joints > low).all() and (joints < high).all():
             return joints
     raise AssertionError("no posture found")
 
 
-def postures(robot: Robot, count: int, rng: np.random.Generator) -> list[tuple[Side, Array]]:
+def postures(robot: Robot, count: int, rng: np.random.Generator) -> Held:
     """Draw postures, on the left and the right foot in turn."""
     sides: tuple[Side, Side] = ("left", "right")
     return [(sides[i % 2], random_posture(robot, sides[i % 2], rng)) for i in range(count)]
@@ -86,7 +87,7 @@ def postures(robot: Robot, count: int, rng: np.random.Generator) -> list[tuple[S
 
 def measure(
     truth: Robot,
-    held: list[tuple[Side, Array]],
+    held: Held,
     rng: np.random.Generator,
     sensors: SensorParameters | None = None,
     cell_order: tuple[int, ...] = (0, 1, 2, 3),
