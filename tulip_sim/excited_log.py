@@ -44,7 +44,8 @@ class _Recorder:
     def tick(self) -> None:
         """Advance by one control tick."""
         sensors = self.world.sensors()
-        self.readings.append(sensors)
+        if sensors.stamp > 0:  # the reading at the start comes out of step with the others
+            self.readings.append(sensors)
         answer = self._legs.tick(sensors)
         if self._pending is not None:
             self.world.apply(self._pending)

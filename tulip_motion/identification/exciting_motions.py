@@ -22,6 +22,7 @@ from tulip_description.robot_io import JointCommand, Sensors
 from tulip_motion.feedforward import feedforward, inverse_dynamics
 from tulip_motion.gait import FootMotion, support_on
 from tulip_motion.head import HeadParameters
+from tulip_motion.identification.motion_log import LEAST_LOAD
 from tulip_motion.interface import Side, Support
 from tulip_motion.inverse_kinematics import LEG_COLUMNS, InverseKinematics, TaskTarget
 from tulip_motion.joint_control import JointGains
@@ -33,11 +34,17 @@ Array = NDArray[np.float64]
 REST = 1.5  # [s] before and after: the IMU's biases are found there
 SHIFT_TIME = 2.5  # [s] of the CoM to its place, and back: slow against its time constant of 0.27 s
 LIFT_TIME = 1.2  # [s] of the foot
-LIFT_HEIGHT = 0.06  # [m] the leg that sags under a wrong model stays clear of the ground
 FADE_TIME = 1.0  # [s] of the sines
 # [N m s/rad] of the ankles' torque against the trunk's turning: stiff joints alone let 23 kg on two ankles rock at
 # 1.4 Hz for many seconds, and the CoP reach the edges of the soles
 BALANCE_DAMPING = (40.0, 30.0)  # pitch, roll
+# [N m/rad] of standing legs. The body's weight takes m g h = 160 off that of the ankles it stands on: with 300 about
+# the roll axis, as in walking, a CoM that is 2 cm off goes to 4 cm, and robots fell
+STANCE_STIFFNESS = (300.0, 1000.0, 1000.0, 1000.0, 800.0, 500.0)
+# [1/s] at which the CoM is taken back to where it shall be, by the measured CoP; with 0.4 robots that sway fell
+CORRECTION_RATE = 0.2
+LEAST_FORCE = 100.0  # [N] on both feet: with less there is no CoP to go by
+LARGEST_CORRECTION = 0.05  # [m] on each axis
 HALF_STEP = 1e-3  # [s] for velocities by central differences; the sines are a thousand times slower
 
 
@@ -73,7 +80,7 @@ class Excitation:
         drop: What the CoM is lowered by first, to have room upwards [m].
         stance: The foot to stand on, if the other swings.
         foot: Of the foot that swings: forward, left, up [m].
-        foot_rise: How far it is lifted beyond `LIFT_HEIGHT` [m].
+        foot_place: About which it swings, from where it stood: forward, left, up [m].
         foot_yaw: Its turn [rad].
         head: Pan and tilt [rad].
         com_ahead: CoM ahead of the stance ankle while the other foot swings [m]: the middle of the sole.
@@ -85,7 +92,7 @@ class Excitation:
     drop: float = 0.0
     stance: Side | None = None
     foot: Axes = (STILL, STILL, STILL)
-    foot_rise: float = 0.0
+    foot_place: tuple[float, float, float] = (0.0, 0.0, 0.06)
     foot_yaw: Sines = STILL
     head: tuple[Sines, Sines] = (STILL, STILL)
     com_ahead: float = 0.04
@@ -135,7 +142,7 @@ def leg_swing(stance: Side, duration: float = 20.0) -> Excitation:
             Sines((0.05 * outwards, 0.04, 0.02), (0.17, 0.53, 1.03)),
             Sines((0.03,), (0.83,)),
         ),
-        foot_rise=0.06,
+        foot_place=(0.0, 0.03 * outwards, 0.12),
         foot_yaw=Sines((0.35, 0.1), (0.61, 1.07)),
         head=LOOKING_ROUND,
     )
@@ -144,16 +151,17 @@ def leg_swing(stance: Side, duration: float = 20.0) -> Excitation:
 class ExcitingMotion:
     """Commands legs and head through one excitation, from a posture with both feet flat, and back to it."""
 
-    def __init__(self, excitation: Excitation, robot: Robot, parameters: MotionParameters | None = None) -> None:
+    def __init__(self, excitation: Excitation, robot: Robot) -> None:
         """Make the motion for a robot as it is believed to be."""
         self._excitation = excitation
-        self._parameters = p = parameters if parameters is not None else MotionParameters()
+        self._parameters = p = MotionParameters(open_stance_stiffness=STANCE_STIFFNESS)
         model = floating_model(with_fixed_head(robot))
         limits = robot.position_limits[:, :12]
         self._kinematics = InverseKinematics(model, p.clik_gain_position, p.clik_gain_orientation, limits)
         self._gains = JointGains(p)
         self._head_parameters = HeadParameters()
         self._names = robot.joint_names
+        self._cells = [foot.cells for foot in robot.feet]
         self._sequence = 0
         self._start: int | None = None
 
@@ -173,6 +181,7 @@ class ExcitingMotion:
             self._begin(sensors.joint_positions[:12])
             self._head_start = sensors.joint_positions[12:].copy()
         t = (sensors.stamp - self._start) * 1e-9
+        self._correct(sensors.foot_cells, t)
         kinematics, stance = self._kinematics, self._stance
         kinematics.update_jacobian(stance)
         kinematics.solve_velocity(self._target(t))
@@ -210,6 +219,7 @@ class ExcitingMotion:
         yaw = pin.log3((base * right).rotation)[2]
         self._feet = (Pose2D(), Pose2D(float(place[0]), float(place[1]), float(yaw)))
         self._torso = base.rotation.copy()
+        self._correction = np.zeros(3)
         kinematics.update_jacobian(self._stance)
         self._com = data.com[0].copy()
         aims = (foot.transform((self._excitation.com_ahead, 0.0)) for foot in self._feet)
@@ -232,6 +242,19 @@ class ExcitingMotion:
             (per_time * pin.log3(torso_1 @ torso_0.T)).tolist(),
             FootMotion((x, y, z), (vx, vy, vz), still, yaw, per_time * (yaw_1 - yaw_0)),
         )
+
+    def _correct(self, foot_cells: Array, t: float) -> None:
+        """Take the CoM a little towards where the CoP shows that it is not."""
+        if foot_cells.sum() < LEAST_FORCE:
+            return
+        places = np.array(
+            [[foot.transform(cell) for cell in cells] for foot, cells in zip(self._feet, self._cells, strict=True)]
+        )
+        loads = np.where(foot_cells.sum(axis=1, keepdims=True) > LEAST_LOAD, foot_cells, 0.0)
+        cop = np.einsum("sc,sci->i", loads, places) / loads.sum()
+        planned = self._places(t)[0][:2] - self._correction[:2]
+        change = self._parameters.control_period * CORRECTION_RATE * (planned - cop)
+        self._correction[:2] = np.clip(self._correction[:2] + change, -LARGEST_CORRECTION, LARGEST_CORRECTION)
 
     def _damp(self, effort: Array, angular_velocity: Array, right_share: float) -> None:
         """Add to the ankles' torques what slows the trunk; a foot bears by its share of the weight."""
@@ -259,12 +282,12 @@ class ExcitingMotion:
         e = self._excitation
         since = t - self._excited_from
         fade = self._fade(since)
-        com = self._com + fade * np.array([axis.at(since) for axis in e.com])
+        com = self._com + self._correction + fade * np.array([axis.at(since) for axis in e.com])
         com += self._shifted(t) * (self._com_shift - np.array([0.0, 0.0, e.drop]))
         torso = pin.exp3(fade * np.array([axis.at(since) for axis in e.torso])) @ self._torso
         resting = self._feet[self._stance.other]
         foot = np.array([resting.x, resting.y, 0.0]) + fade * np.array([axis.at(since) for axis in e.foot])
-        foot[2] += self._lifted(t) * (LIFT_HEIGHT + e.foot_rise)
+        foot += self._lifted(t) * np.array(e.foot_place)
         return com, torso, foot, resting.yaw + fade * e.foot_yaw.at(since)
 
     @property

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_motion.identification.correlated_fit import Series
+from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.motion_log import MotionLog, SmoothMotion, smooth
 from tulip_motion.identification.zmp_regressor import BodyMotion, ZmpRegressor
 from tulip_motion.lipm import GRAVITY
@@ -75,19 +76,19 @@ def zmp_rows(regressor: ZmpRegressor, log: MotionLog, parameters: RowParameters 
     """Return the equations of a recording, which begins and ends at rest on a level floor.
 
     Raises:
-        ValueError: if the recording has no rest to find the IMU's biases in, or no motion, or no force on the feet.
+        IdentificationError: if the recording has no rest to find the IMU's biases in, or no motion, or no force on the feet.
     """
     p = parameters if parameters is not None else RowParameters()
     _check(regressor, log)
     motion = smooth(log, p.cutoff)
     force = motion.foot_cells.sum(axis=(1, 2))
     if not (force > p.least_force).any():
-        raise ValueError(f"the feet never carry {p.least_force} N; expected the log of a robot that stands")
+        raise IdentificationError(f"the feet never carry {p.least_force} N; expected the log of a robot that stands")
     edge = round(1.0 / (p.cutoff * log.period))  # the filter knows only one side of the first and last readings
     biases = find_biases(regressor, log, motion, p, edge)
     moving = motion.specific_force[edge:-edge].std(axis=0).max()
     if moving < p.least_motion:
-        raise ValueError(
+        raise IdentificationError(
             f"the trunk's acceleration varies by {moving:.3f} m/s^2 only; expected {p.least_motion} or more:"
             " from standing still take static identification"
         )
@@ -122,7 +123,7 @@ def find_biases(
     recording: a body that begins and ends at rest has felt gravity alone on average, whatever it did in between.
 
     Raises:
-        ValueError: if there is too little rest.
+        IdentificationError: if there is too little rest.
     """
     p = parameters
     still = (np.abs(motion.dq) < p.rest_speed).all(axis=1)
@@ -130,7 +131,7 @@ def find_biases(
     still &= motion.foot_cells.sum(axis=(1, 2)) > p.least_force
     still[:edge] = still[len(still) - edge :] = False
     if still.sum() * log.period < p.rest_time:
-        raise ValueError(
+        raise IdentificationError(
             f"the robot rests for {still.sum() * log.period:.2f} s of the log; expected {p.rest_time} s or more:"
             " let it stand before it moves, so that the IMU's biases can be found"
         )
@@ -149,7 +150,7 @@ def find_biases(
 def _check(regressor: ZmpRegressor, log: MotionLog) -> None:
     joints, expected = log.joint_positions.shape[1], len(regressor.robot.joint_names)
     if joints != expected:
-        raise ValueError(f"the log has {joints} joints; expected the robot's {expected}: it is of another robot")
+        raise IdentificationError(f"the log has {joints} joints; expected the robot's {expected}: it is of another robot")
 
 
 def _unit(vector: Array) -> Array:
