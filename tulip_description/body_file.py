@@ -154,7 +154,9 @@ def _body(data: Any) -> Body:
     if not isinstance(base, list) or not isinstance(rows, list) or len(rows) != len(base):
         raise _WrongError("base_parameters and base_covariance are expected to be lists of one length")
     covariance = np.array([_numbers(row, len(base), "base_covariance") for row in rows]).reshape(len(base), len(base))
-    if not np.allclose(covariance, covariance.T) or np.linalg.eigvalsh(covariance).min(initial=0.0) < -1e-12:
+    rounding = 1e-9 * np.abs(covariance).max(initial=0.0)
+    asymmetry = np.abs(covariance - covariance.T).max(initial=0.0)
+    if asymmetry > rounding or np.linalg.eigvalsh(covariance).min(initial=0.0) < -rounding:
         raise _WrongError("base_covariance is not symmetric and positive semidefinite")
     return Body(
         variant=str(variant),

@@ -45,7 +45,7 @@ class BodyPrior:
 
     z_0 of each body is the error of its mass, z_1 to z_3 the shift of its CoM, each by its standard deviation:
 
-        m = m_0 + s_m z_0,    m c = m_0 c_0 + c_0 s_m z_0 + (m_0 + unlisted) s_c (z_1, z_2, z_3)              (2d)
+        m = m_0 + s_m z_0,    m c = m_0 c_0 + c_0 s_m z_0 + (m_0 + unlisted) s_c (z_1, z_2, z_3)              (2e)
 
     to first order in the errors. That the masses add up to what the cells weigh is not part of it.
 

@@ -5,7 +5,7 @@ which the last, the sum of all masses, is 1. The IMU is mounted a little askew, 
 axes of base_link, the same in all postures; they move the point below the CoM by about c_z beta, 2 mm for 3 mrad, and
 are found along with the body:
 
-    cop_j = A_j theta_b + N_j beta + e_j,    cov e_j = C_j + s^2 I                                            (2e)
+    cop_j = A_j theta_b + N_j beta + e_j,    cov e_j = C_j + s^2 I                                            (2d)
     beta ~ N(0, s_beta^2)
     N_j = -c_z d(sigma)/d(beta),    d(down)/d(beta) = -[down]x
 
@@ -190,7 +190,7 @@ def weighed_mass(measurements: Sequence[StaticMeasurement]) -> float:
 
 
 class _Problem:
-    """Eq. (2e) of all postures."""
+    """Eq. (2d) of all postures."""
 
     def __init__(
         self,

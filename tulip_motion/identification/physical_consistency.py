@@ -2,7 +2,7 @@
 
 Static postures tell only the base parameters theta_b = K theta (2c), 31 numbers of the playing robot's 71: sums of
 moments and masses along the legs. Gait and feedforward need masses, CoMs and inertias of all links. Of all bodies that
-fit, the most probable one is taken, by Bayes' rule with the robot file as prior, eq. (2d):
+fit, the most probable one is taken, by Bayes' rule with the robot file as prior, eq. (2e):
 
     z = argmin |z|^2 + |theta_b - K (mean + factor z)|^2 by the covariance of theta_b                         (2f)
     such that the masses are those that the cells weigh, in sum, and each at least LIGHTEST of the robot file's
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
+from tulip_description.body_file import Body, BodySource, links_of
 from tulip_description.pseudo_inertia import why_impossible
 from tulip_description.robot import Link, Robot, realizable_inertia
 from tulip_motion.identification.body_prior import body_prior
@@ -95,6 +96,12 @@ def most_probable_body(found: ComIdentification) -> WholeBody:
             )
     left = np.diag(np.linalg.inv(told.T @ told + np.eye(count)))
     return WholeBody(body, (1.0 - left).reshape(-1, PER_BODY), misfit)
+
+
+def as_body(found: ComIdentification, whole: WholeBody, source: BodySource) -> Body:
+    """Return what a body file keeps of an identification: the whole body, and the base parameters behind it."""
+    links = links_of(whole.robot.links)
+    return Body(found.prior.variant, source, links, found.base.names, found.values, found.covariance)
 
 
 def _with_bodies(robot: Robot, theta: Array) -> Robot:

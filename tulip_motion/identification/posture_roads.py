@@ -9,6 +9,7 @@ et al. 1996) whose roads are looked at only when a way wants to use them (lazy: 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,7 @@ class RoadMap:
             solver: Of that foot.
             postures: All that a way may lead over.
         """
-        self._solver, self._postures = solver, tuple(postures)
+        self._solver, self.postures = solver, tuple(postures)
         places = np.array([posture.joint_positions for posture in postures])
         self.distances: Array = np.abs(places[:, None] - places[None]).max(axis=2)
         """(m, m) of the joint that moves farthest [rad]; infinite where a road turned out to be blocked."""
@@ -71,14 +72,14 @@ class RoadMap:
         """Return the roads of the shortest way from a posture to another, or None if none is open."""
         while True:
             graph = csgraph_from_dense(self.distances, null_value=np.inf)
-            _, before = dijkstra(graph, indices=start, return_predecessors=True)
+            _, before = dijkstra(graph, directed=True, indices=np.array(start), return_predecessors=True)
             if end != start and before[end] < 0:
                 return None
             stops = [end]
             while stops[-1] != start:
                 stops.append(int(before[stops[-1]]))
             stops.reverse()
-            roads = [self._road(a, b) for a, b in zip(stops, stops[1:], strict=False)]
+            roads = [self._road(a, b) for a, b in pairwise(stops)]
             found = [road for road in roads if road is not None]
             if len(found) == len(roads):
                 return found
@@ -106,7 +107,7 @@ class RoadMap:
         """Return the straight road between two postures, or None, and block it, if the robot cannot take it."""
         known = self._roads.get((start, end))
         if known is None:
-            known = straight_road(self._solver, self._postures[start], self._postures[end])
+            known = straight_road(self._solver, self.postures[start], self.postures[end])
             if known is None:
                 self.distances[start, end] = self.distances[end, start] = np.inf
                 return None

@@ -51,9 +51,7 @@ class SelfCollision:
             joint_positions: (n,) [rad], order of `robot.joint_names`.
         """
         self._configuration[7:] = joint_positions
-        pin.updateGeometryPlacements(
-            self._model, self._data, self._geometry, self._geometry_data, self._configuration
-        )
+        pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._geometry_data, self._configuration)
         nearest = int(pin.computeDistances(self._geometry, self._geometry_data))
         pair = self._geometry.collisionPairs[nearest]
         names = (_link_of(self._geometry.geometryObjects[index].name) for index in (pair.first, pair.second))

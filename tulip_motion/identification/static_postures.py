@@ -8,6 +8,7 @@ posture is statically stable by construction, and so is everything between two o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -39,8 +40,8 @@ class PostureParameters:
     clearance: float = 0.02  # [m] between parts of the body
     ground_clearance: float = 0.03  # [m] of the other sole's corners; a wrong CoM tilts the body by up to 0.06 rad
     torque_share: float = 0.7  # of the joints' limits, that holding still takes by the model
-    lean_forward: tuple[float, float] = (-0.20, 0.35)  # x of what is up, in base_link, negated: sine of the lean
-    lean_left: tuple[float, float] = (-0.20, 0.20)
+    lean_forward: tuple[float, float] = (-0.25, 0.60)  # x of what is up, in base_link, negated: sine of the lean
+    lean_left: tuple[float, float] = (-0.30, 0.30)
     stance_yaw: tuple[float, float] = (-0.4, 0.4)  # [rad]
     stance_knee: tuple[float, float] = (0.15, 1.1)  # [rad]
     swing_yaw: tuple[float, float] = (-0.7, 0.7)  # [rad] positive turns the toes inwards
@@ -55,9 +56,10 @@ class PostureParameters:
     @property
     def ranges(self) -> Array:
         """(2, 12) lowest and highest coordinates with the left foot on the ground."""
-        names = ("lean_forward", "lean_left", "stance_yaw", "stance_knee", "swing_yaw", "swing_roll", "swing_pitch")
-        names += ("swing_knee", "swing_ankle_pitch", "swing_ankle_roll", "head_pan", "head_tilt")
-        return np.array([getattr(self, name) for name in names]).T
+        stance = (self.lean_forward, self.lean_left, self.stance_yaw, self.stance_knee)
+        swing = (self.swing_yaw, self.swing_roll, self.swing_pitch, self.swing_knee)
+        ankle = (self.swing_ankle_pitch, self.swing_ankle_roll)
+        return np.array([*stance, *swing, *ankle, self.head_pan, self.head_tilt]).T
 
 
 MIRROR = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
@@ -77,6 +79,12 @@ class StaticPosture:
     side: Side
     coordinates: Array
     joint_positions: Array
+
+    @property
+    def up(self) -> Array:
+        """(3,) unit vector upwards in base_link, the sole lying level."""
+        x, y = -self.coordinates[:2]
+        return np.array([x, y, math.sqrt(1.0 - x * x - y * y)])
 
 
 def aim_point(robot: Robot, side: Side) -> Array:

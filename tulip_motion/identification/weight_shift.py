@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from tulip_description.model import floating_model
 from tulip_description.model import Side as SideName
+from tulip_description.model import floating_model
 from tulip_description.planar import Pose2D
 from tulip_description.posture import standing_posture
 from tulip_description.robot import Robot

@@ -11,7 +11,7 @@ from synthetic import base_rotation, com_by_pinocchio
 
 from tulip_description.model import Side
 from tulip_description.robot import VARIANTS, load_robot
-from tulip_motion.identification.com_regressor import ComRegressor, com_regressor, regressor_of, standard_parameters
+from tulip_motion.identification.com_regressor import ComRegressor, regressor_of, standard_parameters
 from tulip_sim.secret_body import secret_body
 
 SIDES = st.sampled_from(["left", "right"])
@@ -26,7 +26,7 @@ def test_regressor_times_parameters_is_pinocchios_com_on_random_bodies_and_postu
     rng = np.random.default_rng(seed)
     robot = secret_body(load_robot(variant), rng, 0.9, 0.2)
     joints = rng.uniform(*robot.position_limits)
-    found = com_regressor(load_robot(variant), side, joints) @ standard_parameters(robot)
+    found = regressor_of(load_robot(variant), side).com(joints) @ standard_parameters(robot)
     assert found == pytest.approx(com_by_pinocchio(robot, side, joints), abs=1e-12)
 
 
@@ -66,6 +66,6 @@ def test_shares_of_mass_add_up_to_1() -> None:
 
 def test_posture_of_another_length_and_unknown_side_are_refused() -> None:
     with pytest.raises(ValueError, match=r"joint_positions has shape \(12,\); expected \(14,\)"):
-        com_regressor(load_robot(), "left", np.zeros(12))
+        regressor_of(load_robot(), "left").com(np.zeros(12))
     with pytest.raises(ValueError, match="side is 'middle'; expected left or right"):
         ComRegressor(load_robot(), "middle")  # type: ignore[arg-type]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,13 +12,14 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 from synthetic import Held, com_by_pinocchio, measure
 
+from tulip_description.body_file import BodySource, read_body, write_body
 from tulip_description.pseudo_inertia import pseudo_inertia, why_impossible
 from tulip_description.robot import VARIANTS, Link, load_robot
 from tulip_motion.identification import physical_consistency
 from tulip_motion.identification.com_identification import ComIdentification, identify_com
 from tulip_motion.identification.com_regressor import standard_parameters
 from tulip_motion.identification.identification_error import IdentificationError
-from tulip_motion.identification.physical_consistency import check_realizable, most_probable_body
+from tulip_motion.identification.physical_consistency import as_body, check_realizable, most_probable_body
 from tulip_sim.secret_body import secret_body, table_robot
 
 ROBOT = load_robot()
@@ -103,6 +105,16 @@ def test_com_of_the_most_probable_body_is_that_of_the_truth_in_unseen_postures(
     truth, robot = secret_body(ROBOT, np.random.default_rng(3)), most_probable_body(fit).robot
     errors = [com_by_pinocchio(robot, *each)[:2] - com_by_pinocchio(truth, *each)[:2] for each in unseen]
     assert np.sqrt(np.mean(np.square(errors), axis=0)).max() < 5e-4  # [m]
+
+
+def test_body_file_of_an_identification_gives_its_whole_body_to_any_robot_of_the_variant(
+    fit: ComIdentification, tmp_path: Path
+) -> None:
+    whole, path = most_probable_body(fit), tmp_path / "body.yaml"
+    write_body(path, as_body(fit, whole, BodySource("static.mcap", "2013-06-24", fit.postures)))
+    assert load_robot(body=path) == whole.robot
+    found = read_body(path)
+    assert found.base_names == fit.base.names and np.array_equal(found.base_covariance, fit.covariance)
 
 
 def test_inertias_are_scaled_by_the_masses(fit: ComIdentification) -> None:
