@@ -150,7 +150,9 @@ def find_biases(
 def _check(regressor: ZmpRegressor, log: MotionLog) -> None:
     joints, expected = log.joint_positions.shape[1], len(regressor.robot.joint_names)
     if joints != expected:
-        raise IdentificationError(f"the log has {joints} joints; expected the robot's {expected}: it is of another robot")
+        raise IdentificationError(
+            f"the log has {joints} joints; expected the robot's {expected}: it is of another robot"
+        )
 
 
 def _unit(vector: Array) -> Array:

@@ -14,6 +14,7 @@ from tulip_description.posture import standing_posture
 from tulip_description.robot import SIDES, Robot, load_robot
 from tulip_description.short_numbers import significant
 from tulip_motion.identification.dynamic_identification import (
+    Combination,
     DynamicIdentification,
     base_combinations,
     com_error,
@@ -227,16 +228,15 @@ def _learned(rows: list[Row]) -> list[str]:
     missed = [c for c in by_static if c not in by_motion]
     static = sum(c.static for c in combinations)
     return [
-        f"The ZMP equation has {len(combinations)} independent combinations of parameters, {static} of which show at rest."
-        f" {STATIC_POSTURES} postures at rest ({1e3 * STATIC_ERROR:.1f} mm of error each) halve the doubt, at least, of"
+        f"The ZMP equation has {len(combinations)} independent combinations of parameters, of which {static} show at"
+        f" rest. {STATIC_POSTURES} postures at rest ({1e3 * STATIC_ERROR:.1f} mm of error each) halve the doubt, at least, of"
         f" {len(by_static)}; these motions of {len(by_motion)}.",
         f"Told by motion alone: {_names(added)}. Told by the postures alone: {_names(missed)}.",
     ]
 
 
-def _names(combinations: Sequence[object]) -> str:
-    names = [getattr(combination, "name", "") for combination in combinations]
-    return ", ".join(f"`{name}`" for name in names) if names else "none"
+def _names(combinations: Sequence[Combination]) -> str:
+    return ", ".join(f"`{combination.name}`" for combination in combinations) or "none"
 
 
 def _range(values: Sequence[float]) -> str:
@@ -267,7 +267,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
             plot.grid(alpha=0.3)
     for plot in axes[-1]:
         plot.set_xlabel("time [s]")
-    axes[0, 0].legend(loc="upper right")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=80)
 
