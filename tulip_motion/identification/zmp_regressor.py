@@ -9,16 +9,17 @@ ten standard parameters of each body, pi = (m, m c, I about the joint; ...):
 
     (F, M_base) = Y(q, v, a) pi                                                            (D2)
 
-The ZMP is the point of the ground about which the horizontal moments vanish, and the cells measure it as the CoP. So with
-u upwards and o the measured CoP, each instant gives two equations, and the cells' sum of forces the third:
+The ZMP is the point of the ground about which the horizontal moments vanish, and the cells measure it as the CoP. So
+with u upwards and o the measured CoP, each instant gives two equations, and the cells' sum of forces the third:
 
     u x M_o = 0,    u . F = sum of the cells,    M_o = M_base - o x F                      (D3)
 
 With any parameters, the ZMP that they predict lies (u x M_o) / (u . F) away from o.                               (D4)
 
 A sole carries on its rim, beyond its cells, and the cells may sit a little elsewhere than drawn: then they show the
-CoP's way from the middle of a foot too short or too long. With o = o_cells + a_x (way along) + a_y (way across), the two
-spreads a are parameters like the others.                                                                   (D5)
+CoP's way from the middle of a foot too short or too long. Two spreads a are parameters like the others:
+
+    o = o_cells + a_x (way along the sole) + a_y (way across)                              (D5)
 
 All of it is written in axes of base_link. Inertial forces do not depend on where the base is or how fast it goes, only
 on its rotation and on the specific force that an accelerometer at base_link would feel, f = a - g: no position,

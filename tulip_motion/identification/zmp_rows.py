@@ -76,7 +76,8 @@ def zmp_rows(regressor: ZmpRegressor, log: MotionLog, parameters: RowParameters 
     """Return the equations of a recording, which begins and ends at rest on a level floor.
 
     Raises:
-        IdentificationError: if the recording has no rest to find the IMU's biases in, or no motion, or no force on the feet.
+        IdentificationError: if the recording has no rest to find the IMU's biases in, no motion, or no force on the
+            feet.
     """
     p = parameters if parameters is not None else RowParameters()
     _check(regressor, log)

@@ -229,8 +229,8 @@ def _learned(rows: list[Row]) -> list[str]:
     static = sum(c.static for c in combinations)
     return [
         f"The ZMP equation has {len(combinations)} independent combinations of parameters, of which {static} show at"
-        f" rest. {STATIC_POSTURES} postures at rest ({1e3 * STATIC_ERROR:.1f} mm of error each) halve the doubt, at least, of"
-        f" {len(by_static)}; these motions of {len(by_motion)}.",
+        f" rest. {STATIC_POSTURES} postures at rest ({1e3 * STATIC_ERROR:.1f} mm of error each) halve the doubt, at"
+        f" least, of {len(by_static)}; these motions of {len(by_motion)}.",
         f"Told by motion alone: {_names(added)}. Told by the postures alone: {_names(missed)}.",
     ]
 

@@ -106,7 +106,7 @@ def swaying_log(
 def _cells(
     force: Array, moment: Array, up: Array, soles: list[pin.SE3], shares: tuple[float, float], cells: Array
 ) -> Array:
-    """Return (2, 4) forces whose common centre is where the wrench has no horizontal moment, on a plane of the soles."""
+    """Return (2, 4) forces whose common centre, on the soles, is where the wrench has no horizontal moment."""
     vertical = float(up @ force)
     result = np.zeros((2, 4))
     # The point r = o + x e_x + y e_y with u x (M - r x F) = 0; two of the three rows are independent.

@@ -27,7 +27,9 @@ def test_a_body_cannot_have_negative_mass_or_a_moment_greater_than_the_other_two
     assert can_be(ball)
     assert not can_be(-ball)
     assert not can_be(ball * [1, 1, 1, 1, 2.1, 1, 1, 1, 1, 1])
-    assert not can_be(ball + [0, 2, 0, 0, 0, 0, 0, 0, 0, 0])  # so far a CoM asks for more moment about the joint
+    assert not can_be(
+        ball + np.array([0, 2, 0, 0, 0, 0, 0, 0, 0, 0])
+    )  # so far a CoM asks for more moment about the joint
     with pytest.raises(ValueError, match="no body has the parameters"):
         log_cholesky(-ball)
 

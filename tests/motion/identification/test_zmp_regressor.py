@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-
 from synthetic_motion import changed, swaying_log
+
 from tulip_description.model import floating_model
 from tulip_description.robot import load_robot
 from tulip_motion.identification.zmp_regressor import (
