@@ -36,6 +36,7 @@ from tulip_sim.bench import (
     odometry,
     push,
     referee,
+    simcheck,
     strategy,
     stress,
     vision,
@@ -45,7 +46,7 @@ from tulip_sim.bench.runner import Row, run, save, write_results
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress),
-    *(vision, localization, ball, head, latency, log, dynamics),
+    *(simcheck, dynamics, vision, localization, ball, head, latency, log),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"

@@ -7,6 +7,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 
 from tulip_ros.mcap_file import Chunk, McapFile
 
@@ -19,7 +20,8 @@ Job = Callable[[McapFile], None]
 class BagWriter:
     """Writes one file after the other, in a thread of its own.
 
-    After an error nothing more is written; the file then ends with a whole record, and can be recovered.
+    A second thread waits while the disk keeps what was written. After an error nothing more is written; the file then
+    ends with a whole record, and can be recovered.
     """
 
     def __init__(self) -> None:
@@ -28,6 +30,8 @@ class BagWriter:
         """Why writing ended early."""
         self._jobs: queue.Queue[tuple[Job, McapFile] | None] = queue.Queue(WAITING)
         self._thread: threading.Thread | None = None
+        self._keeper = ThreadPoolExecutor(1, "recording_sync")
+        self._keeping: Future[None] | None = None
         self._synced = time.monotonic()
 
     def chunk(self, file: McapFile, chunk: Chunk) -> None:
@@ -35,11 +39,12 @@ class BagWriter:
 
         def write(to: McapFile) -> None:
             to.add_chunk(chunk)
-            if time.monotonic() - self._synced > SYNC:
-                to.sync()
+            if time.monotonic() - self._synced > SYNC and (self._keeping is None or self._keeping.done()):
+                self._settle()
+                self._keeping = self._keeper.submit(to.sync)
                 self._synced = time.monotonic()
 
-        self.do(file, write)
+        self._put(file, write)
 
     def do(self, file: McapFile, job: Job) -> None:
         """Do something with a file when all that was asked for before is done.
@@ -47,11 +52,12 @@ class BagWriter:
         Raises:
             OSError: if writing ended early.
         """
-        self.check()
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._work, name="recording", daemon=True)
-            self._thread.start()
-        self._jobs.put((job, file))
+
+        def settled(to: McapFile) -> None:
+            self._settle()
+            job(to)
+
+        self._put(file, settled)
 
     def check(self) -> None:
         """Tell of an error of the thread.
@@ -72,7 +78,25 @@ class BagWriter:
             self._jobs.put(None)
             self._thread.join()
             self._thread = None
+        self._keeper.shutdown()
         self.check()
+
+    def _put(self, file: McapFile, job: Job) -> None:
+        self.check()
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._work, name="recording", daemon=True)
+            self._thread.start()
+        self._jobs.put((job, file))
+
+    def _settle(self) -> None:
+        """Wait until the disk has what it was told to keep.
+
+        Raises:
+            OSError: if it refused.
+        """
+        if self._keeping is not None:
+            self._keeping.result()
+            self._keeping = None
 
     def _work(self) -> None:
         while (entry := self._jobs.get()) is not None:

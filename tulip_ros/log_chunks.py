@@ -7,12 +7,12 @@ some topics of many: here what is not wanted is stepped over, and a chunk is sor
 from __future__ import annotations
 
 import struct
-import zlib
 from collections.abc import Collection, Iterator
 from typing import BinaryIO
 
 import lz4.frame
 import zstandard
+from isal.isal_zlib import crc32
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
@@ -85,7 +85,7 @@ def _content(stream: BinaryIO, index: ChunkIndex) -> bytes:
             raise McapError(f"compression {chunk.compression!r} is not known; expected zstd, lz4 or none")
     except (zstandard.ZstdError, RuntimeError) as error:
         raise McapError(f"a chunk cannot be decompressed: {error}") from error
-    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+    if chunk.uncompressed_crc and crc32(data) != chunk.uncompressed_crc:
         raise McapError(f"the chunk at byte {index.chunk_start_offset} has another checksum than it should")
     return bytes(data)
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import struct
-import zlib
 from array import array
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import zstandard
+from isal.isal_zlib import crc32
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -175,7 +175,7 @@ class McapFile:
             "zstd" if self._compressor else "",
             (chunk.first, chunk.last),
             len(content),
-            zlib.crc32(content),
+            crc32(content),
             chunk.indices,
         )
 
@@ -298,7 +298,7 @@ class McapFile:
                 offsets += encode(SummaryOffset(group_opcode=opcode, group_start=place, group_length=len(group)))
                 content += group
         footer = struct.pack("<BQQQ", Opcode.FOOTER, 20, start, start + len(content))
-        checksum = zlib.crc32(content + offsets + footer)
+        checksum = crc32(content + offsets + footer)
         return content + offsets + encode(Footer(start, start + len(content), checksum))
 
     def _append(self, *parts: bytes | memoryview) -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 import struct
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from mmap import mmap
 
 import lz4.frame
 import zstandard
+from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 
 HEAD = struct.Struct("<BQ")  # opcode, length
@@ -132,7 +132,7 @@ def chunk_content(data: Data, head: ChunkHead) -> bytes | None:
             content = lz4.frame.decompress(held) if head.compression == "lz4" else held
     except (zstandard.ZstdError, RuntimeError, MemoryError):
         return None
-    if len(content) != head.size or (head.checksum and zlib.crc32(content) != head.checksum):
+    if len(content) != head.size or (head.checksum and crc32(content) != head.checksum):
         return None
     return bytes(content)
 
@@ -188,7 +188,7 @@ def _fits(data: Data, opcode: int, begin: int, end: int) -> bool:
     if place + 8 + length + 4 != end:
         return False
     (checksum,) = struct.unpack_from("<I", data, end - 4)
-    return checksum in (0, zlib.crc32(data[begin : end - 4]))
+    return checksum in (0, crc32(data[begin : end - 4]))
 
 
 def _text(data: Data, place: int, end: int) -> int:

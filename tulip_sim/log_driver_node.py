@@ -21,8 +21,8 @@ from tulip_ros.replay_node import open_log
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.time import stamp_of
 from tulip_sim.messages import lens_to_message
+from tulip_sim.recompute.decoding import decoded
 from tulip_sim.recompute.heard import Heard
-from tulip_sim.recompute.vision import decoded
 from tulip_vision.lens import head_camera_lens
 from tulip_vision.messages import picture_to_message
 

@@ -10,7 +10,7 @@ def test_ball_comes_to_rest_where_and_when_small_steps_bring_it() -> None:
     position, velocity, seconds = np.zeros(2), np.array([1.2, -0.9]), 0.0
     where, when = rest(position, velocity, 0.3)
     while np.any(velocity):
-        after = slowed(velocity[None], 0.3, 1e-3)[0]
+        after = np.array(slowed(*velocity.tolist(), 0.3 * 1e-3))
         position = position + 0.5e-3 * (velocity + after)
         velocity, seconds = after, seconds + 1e-3
     assert where == pytest.approx(position, abs=2e-3)
@@ -22,7 +22,8 @@ def test_ball_comes_to_rest_where_and_when_small_steps_bring_it() -> None:
 )
 def test_moments_after_friction_are_those_of_a_cloud_of_balls(velocity: tuple[float, float], spread: float) -> None:
     covariance = spread**2 * np.array([[1.0, 0.3], [0.3, 0.6]])
-    cloud = slowed(np.random.default_rng(0).multivariate_normal(velocity, covariance, 200_000), 0.3, 0.1)
+    before = np.random.default_rng(0).multivariate_normal(velocity, covariance, 200_000)
+    cloud = before * np.maximum(0.0, 1.0 - 0.3 * 0.1 / np.linalg.norm(before, axis=1))[:, None]
     found = slowing(np.array(velocity), covariance, 0.3, 0.1)
     mean = found.keep @ velocity + found.drop
     after = found.keep @ covariance @ found.keep.T + found.noise

@@ -7,17 +7,10 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
-from tulip_description.field import load_field
 from tulip_ros.log_file import Log
+from tulip_sim.bench.log_trial import record_trial
 from tulip_sim.bench.runner import Row
-from tulip_sim.lockstep import Lockstep, Settings
-from tulip_sim.lockstep_notes import explain_trial
-from tulip_sim.lockstep_recording import LockstepRecording, RecordedPictures
-from tulip_sim.perception import PerceptionParameters
 from tulip_sim.recompute.run import recompute
-from tulip_sim.scenario import make_scenario
 
 TRIALS: tuple[tuple[str, str, int, float], ...] = (
     ("worldmodel", "none", 1, 20.0),
@@ -45,7 +38,7 @@ def measure(components: str, pictures: str, seed: int, seconds: float) -> Row:
     chosen = components.split(",")
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary) / "recorded"
-        _record(folder, pictures, seed, seconds)
+        record_trial(folder, pictures, seed, seconds)
         with Log(folder) as log:
             recompute(log, chosen)  # compiles vision's loops, fills the system's cache
             begin, cpu = time.perf_counter(), time.process_time()
@@ -88,17 +81,3 @@ def lines(rows: Sequence[Row]) -> list[str]:
             f" | {row['times_real_time_writing']:.1f} | {row['messages_equal']} of {row['messages']} | {bar:.0f} |"
         )
     return text
-
-
-def _record(folder: Path, pictures: str, seed: int, seconds: float) -> None:
-    recording = LockstepRecording(folder, RecordedPictures(pictures, 0.0))
-    settings = Settings(perception=PerceptionParameters() if pictures == "none" else None)
-    scenario = make_scenario("trial", np.random.default_rng(seed), load_field())
-    trial = Lockstep(scenario, seed, settings, recording.write)
-    try:
-        explain_trial(recording.notebook, seed, "trial", scenario.robot, settings, trial.user.strategy)
-        while trial.stamp < seconds * 1e9:
-            trial.step()
-    finally:
-        trial.close()
-        recording.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
 import time
@@ -9,6 +10,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.serialization import serialize_message
@@ -16,29 +18,32 @@ from sensor_msgs.msg import JointState
 
 from tulip_ros import schemas, topics
 from tulip_ros.bag import Bag
+from tulip_ros.log_file import Log
+from tulip_sim.bench.log_trial import record_trial
 from tulip_sim.bench.runner import Row
 from tulip_sim.messages import jpeg_to_message
 from tulip_vision.messages import picture_to_message
 
 ROUNDS = 5
-SMALL, PICTURES, RAW_PICTURES = 100_000, 5_000, 150
+SMALL, PICTURES, RAW_PICTURES = 100_000, 5_000, 600
 UNIQUE = 20_000  # small messages: 14 MB, so that none comes twice in one chunk
+TRIAL = (1, 20.0)  # seed and length [s] of the trial that the pictures come from: 312 of them
 COLLECTED = 30  # messages that the recorder takes at one time during a match
+JPEG, RAW = topics.CAMERA_COMPRESSED, topics.CAMERA_IMAGE
 
 
 def measure(kind: str) -> Row:
     """Write the same messages with each writer in turn.
 
     Args:
-        kind: "small messages" (joint states of the 14 joints, with noise), "pictures" (640x480 with noise, as JPEG) or
+        kind: "small messages" (joint states of the 14 joints, with noise), "pictures" (of a trial, as JPEG) or
             "raw pictures" (the same as they are).
     """
     messages, topic = MAKERS[kind]()
     writers: dict[str, Callable[[Path, list[bytes], topics.Topic], None]] = {
-        "ours zstd": partial(_ours, compressed=True),
-        "rosbags zstd": partial(_rosbags, compressed=True),
-        "ours": partial(_ours, compressed=False),
-        "rosbags": partial(_rosbags, compressed=False),
+        f"{name}{suffix}": partial(write, compressed=bool(suffix))
+        for suffix in (" zstd", "")
+        for name, write in (("ours", _ours), ("rosbags kept", _rosbags_kept), ("rosbags", _rosbags))
     }
     times: dict[str, list[float]] = {name: [] for name in writers}
     sizes: dict[str, int] = {}
@@ -65,25 +70,29 @@ def _joint_states() -> tuple[list[bytes], topics.Topic]:
     names = [f"joint_{number}_of_the_leg" for number in range(14)]
     values = rng.normal(size=(UNIQUE, 3, 14)).round(4).tolist()
     data = [serialize_message(JointState(name=names, position=p, velocity=v, effort=e)) for p, v, e in values]
-    return [data[number % len(data)] for number in range(SMALL)], topics.JOINT_STATES
-
-
-def _noisy() -> list[NDArray[np.uint8]]:
-    """Return ten (480, 640, 3) pictures."""
-    rng = np.random.default_rng(1)
-    rows, columns = np.mgrid[:480, :640]
-    scene = np.stack([rows / 3.0, 90.0 + columns / 10.0, 40.0 + (columns // 80 % 2) * 60.0], axis=-1)
-    return [np.clip(scene + rng.normal(scale=4.0, size=scene.shape), 0.0, 255.0).astype(np.uint8) for _ in range(10)]
+    return _repeated(data, SMALL), topics.JOINT_STATES
 
 
 def _pictures() -> tuple[list[bytes], topics.Topic]:
-    data = [serialize_message(jpeg_to_message(picture, 0)) for picture in _noisy()]
-    return [data[number % len(data)] for number in range(PICTURES)], topics.CAMERA_COMPRESSED
+    return _repeated([serialize_message(jpeg_to_message(picture, 0)) for picture in _trial()], PICTURES), JPEG
 
 
 def _raw_pictures() -> tuple[list[bytes], topics.Topic]:
-    data = [serialize_message(picture_to_message(picture, 0)) for picture in _noisy()]
-    return [data[number % len(data)] for number in range(RAW_PICTURES)], topics.CAMERA_IMAGE
+    return _repeated([serialize_message(picture_to_message(picture, 0)) for picture in _trial()], RAW_PICTURES), RAW
+
+
+def _trial() -> list[NDArray[np.uint8]]:
+    """Return the (480, 640, 3) pictures of a trial."""
+    with tempfile.TemporaryDirectory(prefix="tulip_log_") as scratch:
+        folder = Path(scratch) / "trial"
+        record_trial(folder, "png", *TRIAL)
+        with Log(folder) as log:
+            coded = [log.decode(record).data for record in log.records([f"/{JPEG.name}"])]
+    return [np.asarray(cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR), np.uint8) for data in coded]
+
+
+def _repeated(data: list[bytes], count: int) -> list[bytes]:
+    return [data[number % len(data)] for number in range(count)]
 
 
 MAKERS = {"small messages": _joint_states, "pictures": _pictures, "raw pictures": _raw_pictures}
@@ -110,3 +119,11 @@ def _rosbags(folder: Path, messages: list[bytes], topic: topics.Topic, compresse
         connection = writer.add_connection(f"/{topic.name}", topic.type_name, msgdef=definition, rihs01="RIHS01_0")
         for number, data in enumerate(messages):
             writer.write(connection, number * 1_000_000, data)
+
+
+def _rosbags_kept(folder: Path, messages: list[bytes], topic: topics.Topic, compressed: bool) -> None:
+    """Have the disk keep what rosbags wrote, as ours does."""
+    _rosbags(folder, messages, topic, compressed)
+    for path in folder.glob("*.mcap"):
+        with path.open("rb") as file:
+            os.fdatasync(file.fileno())

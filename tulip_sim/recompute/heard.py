@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tulip_ros.log_file import Log, Record
 from tulip_ros.serialized import time_at
@@ -24,11 +28,13 @@ class Heard:
         name: Of its topic, without the robot's namespace.
         record: As recorded.
         log: The recording, which decodes it.
+        picture: The picture that it holds, while that is decoded beside (decoding.py).
     """
 
     name: str
     record: Record
     log: Log
+    picture: Future[NDArray[np.uint8]] | None = None
 
     @property
     def log_time(self) -> int:

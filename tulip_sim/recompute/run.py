@@ -17,11 +17,12 @@ from tulip_ros.log_edit import writing
 from tulip_ros.log_file import Log, LoggedTopic, Record
 from tulip_ros.serialized import after_header, time_at
 from tulip_sim.recompute.decisions import HeadStage, StrategyStage
+from tulip_sim.recompute.decoding import COMPRESSED, RAW, decoding_ahead
 from tulip_sim.recompute.differences import Comparison, Difference
 from tulip_sim.recompute.heard import UNIX_TIME, Heard, Made, Stage
 from tulip_sim.recompute.settings import RobotParameters, parameters_of
 from tulip_sim.recompute.truth import Judge, Judgement
-from tulip_sim.recompute.vision import COMPRESSED, RAW, VisionStage
+from tulip_sim.recompute.vision import VisionStage
 from tulip_sim.recompute.world_model import WorldModelStage
 
 COMPONENTS = ("vision", "worldmodel", "strategy", "head")
@@ -190,12 +191,18 @@ def _run(log: Log, robots: Sequence[_Robot], bag: Bag | None, progress: Callable
     begin, end = log.span
     lockstep = begin < UNIX_TIME
     copied: set[str] = set()
-    for number, record in enumerate(log.records(None if bag is not None else list(routes))):
+    records = log.records(None if bag is not None else list(routes))
+    messages: Iterable[Heard] = (
+        Heard(routes[name][1] if (name := each.topic.name) in routes else name, each, log) for each in records
+    )
+    if any(robot.pictures == COMPRESSED for robot in robots):
+        messages = decoding_ahead(messages)
+    for number, heard in enumerate(messages):
+        record = heard.record
         _declare(bag, copied, record, routes)
         route = routes.get(record.topic.name)
         if route is not None:
-            robot, name = route
-            robot.take(Heard(name, record, log))
+            route[0].take(heard)
         elif bag is not None:
             bag.write(record.topic.name, record.data, record.log_time, record.publish_time)
         if progress is not None and number % PROGRESS == 0:

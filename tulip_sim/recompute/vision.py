@@ -7,25 +7,22 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
-import cv2
-import numpy as np
-from numpy.typing import NDArray
-
 from tulip_description.camera_mount import load_mount
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.robot import HEAD_JOINTS, load_robot
 from tulip_ros import topics
 from tulip_ros.time import stamp_of
+from tulip_sim.recompute.decoding import decoded
 from tulip_sim.recompute.heard import OVERDUE, UNIX_TIME, Heard, Made
 from tulip_vision.lens import Lens, head_camera_lens
-from tulip_vision.messages import features_to_message, lens_from_message, picture_from_message
+from tulip_vision.messages import features_to_message, lens_from_message
 from tulip_vision.own_body import OwnBody
 from tulip_vision.pipeline import Vision, VisionParameters
 from tulip_vision.pose_buffer import MissingPose, PoseBuffer, PoseBufferParameters
 
 FEATURES = topics.FEATURES.name
 ODOMETRY, JOINTS = topics.ODOMETRY.name, topics.JOINT_STATES.name
-RAW, COMPRESSED, LENS = topics.CAMERA_IMAGE.name, topics.CAMERA_COMPRESSED.name, topics.CAMERA_INFO.name
+LENS = topics.CAMERA_INFO.name
 
 
 class VisionStage:
@@ -138,17 +135,3 @@ class VisionStage:
                 self._counts["unusable pictures"] += 1
                 continue
             yield Made(FEATURES, asked.log_time, asked.stamp, features_to_message(features))
-
-
-def decoded(heard: Heard) -> NDArray[np.uint8]:
-    """Return the (height, width, 3) BGR picture of a recorded message, compressed or not.
-
-    Raises:
-        ValueError: if it is none.
-    """
-    if heard.name == RAW:
-        return picture_from_message(heard.message)
-    picture = cv2.imdecode(np.frombuffer(heard.message.data, np.uint8), cv2.IMREAD_COLOR)
-    if picture is None:
-        raise ValueError(f"data of format {heard.message.format!r} is no picture; expected JPEG or PNG")
-    return np.asarray(picture, np.uint8)

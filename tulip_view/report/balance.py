@@ -21,6 +21,7 @@ from tulip_view.report.figures import (
     LeftOut,
     Line,
     Section,
+    peaks,
     thin,
 )
 
@@ -71,8 +72,7 @@ def balance(recording: Recording, robot: Robot) -> Section:
         for name, points, colour, dashed in seen:
             values = points[:, axis].copy()
             values[changes] = np.nan  # the frame changes from one foot to the other
-            (shown,) = thin(values)
-            figure.items.append(Line(name, t, shown, colour, dashed=dashed))
+            figure.items.append(Line(name, *peaks(track.times, values), colour, dashed=dashed))
         figure.y_range = _limits(low[:, axis], high[:, axis])
         section.figures.append(figure)
     for side, name in enumerate(("left", "right")):

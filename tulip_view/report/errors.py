@@ -9,7 +9,7 @@ from tulip_msgs.msg import GameState
 from tulip_ros import topics
 from tulip_view.columns import Alignment, attitude
 from tulip_view.recording import Recording, Track
-from tulip_view.report.figures import BLUE, RED, SKY, Array, Band, Figure, LeftOut, Line, Section, thin
+from tulip_view.report.figures import BLUE, RED, SKY, Array, Band, Figure, LeftOut, Line, Section, peaks, thin
 from tulip_view.tables import align
 
 Mask = NDArray[np.bool_]
@@ -99,9 +99,9 @@ def _ball(world: Track, real: Array, known: Mask) -> tuple[Array, Array]:
 def _add(
     section: Section, key: str, name: str, unit: str, times: Array, error: Array, spread: Array, play: Mask
 ) -> None:
-    t, e, s = thin(times, error, SIGMAS * spread)
+    t, s = thin(times, SIGMAS * spread)
     figure = Figure(f"error{key}", f"{name}: estimate - truth", "time [s]", f"error [{unit}]", height=210)
-    figure.items = [Band(f"{SIGMAS:g} sigma", t, -s, s, SKY), Line("error", t, e, BLUE)]
+    figure.items = [Band(f"{SIGMAS:g} sigma", t, -s, s, SKY), Line("error", *peaks(times, error), BLUE)]
     known = np.isfinite(error)
     counted = known & play if (known & play).any() else known
     if known.any():
@@ -118,9 +118,10 @@ def _add(
         )
         widest = max(1.15 * figures[2], min(1.2 * float(np.percentile(claimed, 90)), WIDEST * figures[2]), 1e-3)
         figure.y_range = (-widest, widest)
-        outside = np.abs(e) > s
+        outside = np.abs(error) > SIGMAS * spread
         if outside.any():
-            figure.items.append(Line("outside the band", t, np.where(outside, e, np.nan), RED, points=True, width=3))
+            x, y = peaks(times, np.where(outside, error, np.nan))
+            figure.items.append(Line("outside the band", x, y, RED, points=True, width=3))
     section.figures.append(figure)
 
 

@@ -165,6 +165,31 @@ def thin(*columns: Array, most: int = MOST_POINTS) -> tuple[Array, ...]:
     return tuple(column[::step] for column in columns)
 
 
+def peaks(times: Array, values: Array, most: int = MOST_POINTS) -> tuple[Array, Array]:
+    """Return a line with fewer points that still shows its peaks and its gaps.
+
+    Of each piece of the line, the least and the greatest value are kept, and the first NaN.
+
+    Args:
+        times: (n,) [s].
+        values: (n,), NaN in gaps.
+        most: How many points may be left, gaps not counted.
+    """
+    count = len(values)
+    if count <= most:
+        return times, values
+    size = -(-2 * count // most)
+    padded = np.full((-(-count // size), size), np.inf)
+    padded.ravel()[:count] = values
+    gaps = np.isnan(padded)
+    starts = size * np.arange(len(padded))
+    low = np.where(gaps, np.inf, padded).argmin(axis=1)
+    high = np.where(gaps | np.isinf(padded), -np.inf, padded).argmax(axis=1)
+    broken = gaps.any(axis=1)
+    kept = np.unique(np.concatenate((starts + low, starts + high, (starts + gaps.argmax(axis=1))[broken])))
+    return times[kept], values[kept]
+
+
 def spans_of(lane: str, times: Array, labels: list[str], end: float, colours: dict[str, str]) -> list[Span]:
     """Return the pieces of time in which a label stays the same.
 

@@ -8,7 +8,7 @@ from tulip_description.robot import LEG_JOINTS
 from tulip_ros import topics
 from tulip_view.columns import LINEAR
 from tulip_view.recording import Recording
-from tulip_view.report.figures import BLACK, BLUE, GREEN, ORANGE, RED, Array, Figure, LeftOut, Line, Section, thin
+from tulip_view.report.figures import BLACK, BLUE, GREEN, ORANGE, RED, Array, Figure, LeftOut, Line, Section, peaks
 from tulip_view.tables import align
 
 TITLE = "Joints"
@@ -39,22 +39,19 @@ def joints(recording: Recording) -> Section:
     section.header = ("joint", "RMS tracking error", "greatest", "RMS torque (sum of parts)", "of it feedback")
     for index, name in enumerate(readable):
         off = np.degrees(desired[:, index] - measured[:, index])
-        t, want, have, lag = thin(
-            track.times, np.degrees(desired[:, index]), np.degrees(measured[:, index]), off, most=MOST
-        )
         angle.items += [
-            Line("desired", t, want, ORANGE, width=4.0, choice=name),  # broad: good tracking would hide it
-            Line("measured", t, have, BLUE, choice=name),
+            # The desired one is broad: good tracking would hide it.
+            Line("desired", *peaks(track.times, np.degrees(desired[:, index]), MOST), ORANGE, width=4.0, choice=name),
+            Line("measured", *peaks(track.times, np.degrees(measured[:, index]), MOST), BLUE, choice=name),
         ]
-        error.items.append(Line("desired - measured", t, lag, RED, choice=name))
+        error.items.append(Line("desired - measured", *peaks(track.times, off, MOST), RED, choice=name))
         for label, values, colour in zip(
             ("feedback", "feedforward", "learned"), parts, (BLUE, ORANGE, GREEN), strict=True
         ):
-            torque.items.append(Line(label, t, thin(values[:, index], most=MOST)[0], colour, choice=name))
+            torque.items.append(Line(label, *peaks(track.times, values[:, index], MOST), colour, choice=name))
         if sensed is not None:
-            torque.items.append(
-                Line("measured", t, thin(sensed[:, index], most=MOST)[0], BLACK, dashed=True, width=1.0, choice=name)
-            )
+            t, values = peaks(track.times, sensed[:, index], MOST)
+            torque.items.append(Line("measured", t, values, BLACK, dashed=True, width=1.0, choice=name))
         total = sum(part[:, index] for part in parts)
         feedback = parts[0][:, index]
         moving = np.isfinite(off)
