@@ -39,9 +39,7 @@ def holds_of(log: Log, namespace: str = "") -> tuple[Hold, ...]:
     """
     name = _full_name(topics.IDENTIFICATION, namespace)
     if name not in log.topics:
-        raise BadInputError(
-            f"Recording {log.path} has no topic {name}; expected one of scripts/identify.py run."
-        )
+        raise BadInputError(f"Recording {log.path} has no topic {name}; expected one of scripts/identify.py run.")
     found: dict[int, Hold] = {}
     for record in log.records([name]):
         try:

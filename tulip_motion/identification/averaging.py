@@ -3,7 +3,8 @@
 The CoP lies below the CoM only if nothing accelerates. So readings count once the robot is still, by gyro and joint
 speeds, and the robot has to stay still as long as they are taken. How sure the mean is follows from the spread of the
 readings; as these hang together in time (the body sways a little), n of them count for n / tau, with tau from their
-autocorrelation (Sokal, Monte Carlo Methods in Statistical Mechanics, 1996).
+autocorrelation (Sokal, Monte Carlo Methods in Statistical Mechanics, 1996; Wolff, Monte Carlo errors with less errors,
+2004).
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from tulip_motion.identification.static_measurement import StaticMeasurement
 
 Array = NDArray[np.float64]
 
-WINDOW = 5.0  # correlation times after which the sum of autocorrelations is cut: what follows is noise
+WINDOW = 2.5  # correlation times tau after which the sum of autocorrelations is cut: what follows is noise
 PARTS = 5  # of the time that is looked at
 LEAST_LOAD = 1.0  # [N] with less on a foot it has no CoP
 
@@ -142,9 +143,7 @@ def covariance_of_mean(values: Array) -> Array:
     number = len(values)
     deviations = values - values.mean(axis=0)
     times = np.array([correlation_time(column) for column in deviations.T])
-    # The mean takes a part of the spread with it: that of n / tau independent readings.
-    scale = np.sqrt(times / np.maximum(1.0 - times / number, 0.1))
-    covariance: Array = deviations.T @ deviations / number**2 * np.outer(scale, scale)
+    covariance: Array = deviations.T @ deviations / number**2 * np.sqrt(np.outer(times, times))
     return covariance
 
 
@@ -160,5 +159,8 @@ def correlation_time(deviations: Array) -> float:
     if correlations[0] == 0.0:
         return 1.0
     sums = 2.0 * np.cumsum(correlations / correlations[0]) - 1.0
-    wide = np.flatnonzero(np.arange(number) >= WINDOW * np.maximum(sums, 1.0))
-    return max(1.0, float(sums[wide[0]] if wide.size else sums.max()))
+    lags = np.arange(number)
+    wide = np.flatnonzero(lags >= WINDOW * np.maximum(sums, 1.0))
+    lag = int(wide[0]) if wide.size else number // 3
+    # The mean, which was taken off, takes the variance of the mean off each of the 2 lag + 1 terms (Wolff 2004).
+    return max(1.0, float(sums[lag])) / max(1.0 - (2 * lag + 1) / number, 0.2)

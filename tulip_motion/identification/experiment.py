@@ -125,16 +125,16 @@ class Experiment:
 
     def tick(self, sensors: Sensors) -> JointCommand:
         """Return the command for all joints that answers one reading of the sensors."""
-        if self.fallen or self._watch.is_falling(sensors):
-            self.fallen, self.reason = True, self.reason or "the robot falls"
-            return self._control.limp(sensors)
         if self._here is None:
             self._start(sensors)
         now, control = self._now, self._control
         control.body.update(sensors, now.stance)
+        if self.fallen or self._watch.is_falling(sensors, control.body):
+            self.fallen, self.reason = True, self.reason or "the robot falls"
+            return control.limp(sensors)
         share, position, velocity = self._reference()
         command = control.command(sensors, now.stance, share, position, velocity)
-        fault = self._watch.fault(sensors, control.body, now.stance, share, command.position)
+        fault = self._watch.fault(sensors, control.body, now, command.position)
         if fault:
             self.abort(fault)
         if share == ALONE and self._average is None:
@@ -170,14 +170,13 @@ class Experiment:
         still = self._gate.is_still(sensors, self._control.body.cop)
         if self._average is None:
             if still and np.abs(self._gate.cop - self._control.aims[now.stance]).max() < p.settle_cop:
-                self._average = HoldAverage(self._robot, side)
-                self._averaging_since = sensors.stamp
+                self._average, self._averaging_since = HoldAverage(self._robot, side), sensors.stamp
             elif self._elapsed >= now.time:
                 self._left_out.append(now.posture)
                 self._begin_next()
         elif not still:
             self._average = None
-        else:
+        if self._average is not None:
             self._average.add(sensors)
             if len(self._average) * self._period >= p.averaging.duration:
                 self.measurements.append(self._average.measurement())
@@ -194,8 +193,10 @@ class Experiment:
             self._go_back()
         elif now.doing is Doing.UNLOAD:
             error = float(np.abs(control.aims[now.stance] - control.body.cop).max())
-            if error < self._parameters.unload_cop or self._elapsed >= now.time:
+            if error < self._parameters.unload_cop:
                 self._begin_next()
+            elif self._elapsed >= now.time:
+                self.abort(f"the weight does not come over the {now.stance.name.lower()} foot")
         elif now.doing is not Doing.HOLD and self._elapsed >= now.time and self._ahead:
             self._begin_next()
 

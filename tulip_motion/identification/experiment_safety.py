@@ -15,7 +15,7 @@ from tulip_description.robot_io import Sensors
 from tulip_motion.fall_detection import predicted_tilt
 from tulip_motion.identification.averaging import up_in_base
 from tulip_motion.identification.one_foot_control import BodyOnFeet
-from tulip_motion.interface import Side
+from tulip_motion.identification.passages import ALONE, Doing, Passage
 from tulip_motion.lipm import GRAVITY
 
 Array = NDArray[np.float64]
@@ -33,7 +33,8 @@ class SafetyParameters:
     range_margin: float = 0.02  # [rad] an encoder may be beyond its joint's range
     least_load: float = 0.6  # of the robot's weight on its feet
     touch: float = 25.0  # [N] on the foot that shall be in the air
-    falling: float = 0.7  # [rad] of the trunk's tilt, now or in a moment: too late for anything but going limp
+    lost_sole: float = 0.35  # [rad] the same, when it is too late for anything but going limp
+    falling: float = 1.0  # [rad] of the trunk's tilt, now or in a moment, likewise; postures lean by 0.74 at most
     horizon: float = 0.2  # [s] that moment
 
 
@@ -55,31 +56,36 @@ class Watch:
         self._least_load = parameters.least_load * robot.mass * GRAVITY
         self._lasting: Counter[str] = Counter()
 
-    def is_falling(self, sensors: Sensors) -> bool:
-        """Return whether the robot can no longer be held."""
+    def is_falling(self, sensors: Sensors, body: BodyOnFeet) -> bool:
+        """Return whether the robot can no longer be held.
+
+        Args:
+            sensors: The reading.
+            body: What follows from it.
+        """
         p = self._parameters
         rotation = quaternion_matrix(sensors.imu_orientation.tolist())
         tilt, predicted = predicted_tilt(rotation, rotation @ sensors.imu_angular_velocity, p.horizon)
-        return max(tilt, predicted) > p.falling
+        return max(tilt, predicted) > p.falling or lean_error(sensors, body) > p.lost_sole
 
-    def fault(self, sensors: Sensors, body: BodyOnFeet, stance: Side, share: float, wanted: Array) -> str:
+    def fault(self, sensors: Sensors, body: BodyOnFeet, passage: Passage, wanted: Array) -> str:
         """Return why the experiment has to end, in words, or "".
 
         Args:
             sensors: The reading.
             body: What follows from it.
-            stance: The foot that carries more.
-            share: Of the weight that it shall carry.
+            passage: What the robot does.
             wanted: (n,) where the joints shall be [rad].
         """
-        signs = self._signs(sensors, body, stance, share, wanted)
+        signs = self._signs(sensors, body, passage, wanted)
         self._lasting = Counter({kind: self._lasting[kind] + 1 for kind in signs})
         lasting = [kind for kind, ticks in self._lasting.items() if ticks >= self._ticks]
         return signs[lasting[0]] if lasting else ""
 
-    def _signs(self, sensors: Sensors, body: BodyOnFeet, stance: Side, share: float, wanted: Array) -> dict[str, str]:
+    def _signs(self, sensors: Sensors, body: BodyOnFeet, passage: Passage, wanted: Array) -> dict[str, str]:
         """Return what is wrong with one reading: the kind, and in words."""
-        p, names, found = self._parameters, self._robot.joint_names, {}
+        p, names, stance = self._parameters, self._robot.joint_names, passage.stance
+        found: dict[str, str] = {}
         angles = sensors.joint_positions
         outside = np.maximum(self._low - angles, angles - self._high)
         if not (np.isfinite(angles).all() and outside.max() < p.range_margin):
@@ -93,16 +99,24 @@ class Watch:
         if (efforts > self._torques).any():
             worst = int(np.argmax(efforts / self._torques))
             found["torque"] = f"{names[worst]} takes {efforts[worst]:.0f} N m, its limit"
-        lean = math.acos(min(1.0, float(up_in_base(sensors) @ body.up)))
+        lean = lean_error(sensors, body)
         if lean > p.lean_error:
             found["lean"] = f"the trunk leans {lean:.2f} rad more than the joints say: the sole has tilted"
         if body.loads.sum() < self._least_load:
             found["load"] = f"the feet carry {body.loads.sum():.0f} N: they have lost the ground"
-        elif share >= 1.0:
+        elif passage.shares == (ALONE, ALONE):
             foot = self._robot.feet[stance]
             room = min(
                 body.cop[0] - foot.x[0], foot.x[1] - body.cop[0], body.cop[1] - foot.y[0], foot.y[1] - body.cop[1]
             )
             if room < p.edge:
                 found["edge"] = f"the CoP is {1e3 * room:.0f} mm from the edge of the sole"
+        touch = body.loads[stance.other]
+        if passage.doing in (Doing.MOVE, Doing.HOLD) and touch > p.touch:
+            found["touch"] = f"the foot in the air touches something with {touch:.0f} N"
         return found
+
+
+def lean_error(sensors: Sensors, body: BodyOnFeet) -> float:
+    """Return the angle between up by the IMU and up by the joints, the stance sole lying level [rad]."""
+    return math.acos(min(1.0, float(up_in_base(sensors) @ body.up)))

@@ -132,7 +132,7 @@ class OneFootControl:
             self._smooth_cop = self.body.cop
         self._smooth_cop = self._smooth_cop + p.control_period / p.cop_smoothing * (self.body.cop - self._smooth_cop)
         ahead, left = (self.aims[stance] - self._smooth_cop) * p.cop_gain * p.control_period / p.pendulum_height
-        # A foot that turns toes down against the shank takes the body back; soles up inside, to the left.
+        # The sole rests: a positive ankle pitch takes the body back, a positive roll takes it to the left.
         turned = self.correction[stance] + (-ahead, left)
         self.correction[stance] = np.clip(turned, -p.most_correction, p.most_correction)
 
@@ -165,22 +165,13 @@ class OneFootControl:
             torques[ankle] += (sway[0], -sway[1])
         torques[:12] = np.clip(torques[:12], -self._limits, self._limits)
         support = (Support.LEFT, Support.RIGHT)[stance] if share >= 1.0 else Support.DOUBLE
-        stiffness, damping = self._gains.of(support, open_loop=True)
-        return self._send(
-            sensors,
-            np.clip(wanted, self._low, self._high),
-            velocities,
-            torques,
-            np.concatenate([stiffness, self._head_gains[0]]),
-            np.concatenate([damping, self._head_gains[1]]),
-        )
+        reachable = np.clip(wanted, self._low, self._high)
+        return self._send(sensors, reachable, velocities, torques, self._gains.of(support, open_loop=True))
 
     def limp(self, sensors: Sensors) -> JointCommand:
         """Return the command that lets the robot sink."""
         zero = np.zeros(len(self._names))
-        stiffness, damping = self._gains.limp
-        gains = (np.concatenate([stiffness, self._head_gains[0]]), np.concatenate([damping, self._head_gains[1]]))
-        return self._send(sensors, sensors.joint_positions, zero, zero, *gains)
+        return self._send(sensors, sensors.joint_positions, zero, zero, self._gains.limp)
 
     def _gravity(self, stance: Side, share: float) -> Array:
         """Return the (12,) torques that hold the legs as they are, eqs. (14)-(15) with gravity alone."""
@@ -190,6 +181,12 @@ class OneFootControl:
         left, right = (sole.act(np.array((*aim, 0.0))) for sole, aim in zip(soles, self.aims, strict=True))
         return feedforward(kinematics, inverse_dynamics(kinematics, AT_REST, AT_REST), right_share, (left, right))
 
-    def _send(self, sensors: Sensors, *values: Array) -> JointCommand:
+    def _send(
+        self, sensors: Sensors, positions: Array, velocities: Array, torques: Array, leg_gains: tuple[Array, Array]
+    ) -> JointCommand:
+        """Number a command, and add the head's gains to those of the legs."""
         self._sequence += 1
-        return JointCommand(self._sequence, sensors.stamp, self._names, *values)
+        stiffness, damping = (np.concatenate(pair) for pair in zip(leg_gains, self._head_gains, strict=True))
+        return JointCommand(
+            self._sequence, sensors.stamp, self._names, positions, velocities, torques, stiffness, damping
+        )

@@ -59,7 +59,7 @@ class Pace:
     least_time: float = 0.8  # [s] of a road
     shift_time: float = 2.5  # [s] from both feet onto one
     lift_time: float = 2.0  # [s]
-    unload_patience: float = 3.0  # [s] for the CoP to come near its aim before the foot lifts
+    unload_patience: float = 8.0  # [s] for the CoP to come near its aim before the foot lifts
     hold_patience: float = 8.0  # [s] for the robot to become still; a posture that takes longer is left out
 
     def __post_init__(self) -> None:

@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from tulip_description.model import floating_model
-from tulip_description.robot import SIDES, Box, Link, Robot
+from tulip_description.robot import LEG_JOINTS, Box, Link, Robot
 
 Array = NDArray[np.float64]
 
@@ -37,9 +37,10 @@ class SelfCollision:
                     self._add(link, box)
         shapes = self._geometry.geometryObjects
         neighbours = _neighbours(robot)
+        legs = {joint.child for joint in robot.joints if joint.name in LEG_JOINTS}
         for first, second in combinations(range(len(shapes)), 2):
             names = frozenset((_link_of(shapes[first].name), _link_of(shapes[second].name)))
-            if len(names) == 2 and any(_is_leg(name) for name in names) and names not in neighbours:
+            if len(names) == 2 and names & legs and names not in neighbours:
                 self._geometry.addCollisionPair(pin.CollisionPair(first, second))
         self._geometry_data = self._geometry.createData()
         self._configuration = pin.neutral(self._model)
@@ -66,10 +67,6 @@ class SelfCollision:
 
 def _link_of(shape: str) -> str:
     return shape.partition("/")[0]
-
-
-def _is_leg(link: str) -> bool:
-    return link.startswith(tuple(f"{side}_" for side in SIDES)) and not link.endswith("_arm")
 
 
 def _neighbours(robot: Robot) -> set[frozenset[str]]:

@@ -37,7 +37,7 @@ def reading(tick: int, forces: np.ndarray, joint_speed: float = 0.0, turning: fl
 
 
 def coloured(rng: np.random.Generator, number: int, memory: float) -> np.ndarray:
-    """Return (number, 2) readings, each of which remembers a share of the one before; variance 1, two correlated axes."""
+    """Return (number, 2) readings, each of which remembers a share of the one before; variance 1."""
     white = rng.standard_normal((number + 500, 2)) @ np.array([[1.0, 0.6], [0.0, 0.8]])
     return lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], white, axis=0)[500:]
 
@@ -48,19 +48,19 @@ def test_correlation_time_of_a_known_process(memory: float, tau: float):
     assert correlation_time(values - values.mean()) == pytest.approx(tau, rel=0.2)  # (1 + a) / (1 - a)
 
 
-@pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
-def test_covariance_of_the_mean_is_honest_on_correlated_noise(memory: float):
+@pytest.mark.parametrize(("memory", "number"), [(0.0, 300), (0.5, 300), (0.9, 1500)])
+def test_covariance_of_the_mean_is_honest_on_correlated_noise(memory: float, number: int):
     rng = np.random.default_rng(1)
     errors, claimed = [], []
     for _ in range(600):
-        values = coloured(rng, 300, memory)
+        values = coloured(rng, number, memory)
         errors.append(values.mean(axis=0))
         claimed.append(covariance_of_mean(values))
     actual, said = np.cov(np.array(errors).T), np.mean(claimed, axis=0)
-    assert said == pytest.approx(actual, rel=0.25, abs=0.1 * actual[0, 0])
-    # Inverses of estimated covariances make the mean of NEES greater than 2; with 300 / 19 effective readings by most.
+    assert said == pytest.approx(actual, rel=0.2, abs=0.1 * actual[0, 0])
+    # The inverse of a covariance that is estimated from few independent readings makes the mean of NEES exceed 2.
     nees = np.mean([e @ np.linalg.solve(c, e) for e, c in zip(errors, claimed, strict=True)])
-    assert 1.7 < nees < (2.4 if memory < 0.9 else 4.0)
+    assert 1.7 < nees < 2.6
 
 
 def test_means_are_those_of_the_readings():
@@ -87,7 +87,7 @@ def test_too_few_readings_and_an_unloaded_foot_are_refused():
         average.measurement()
     for tick in range(60):
         average.add(reading(tick, np.full(4, 50.0)))  # on the left foot
-    with pytest.raises(ValueError, match="right foot carried 0.0 N"):
+    with pytest.raises(ValueError, match="the right foot carried"):
         average.measurement()
 
 

@@ -90,9 +90,7 @@ def test_postures_of_a_wrong_model_are_held_and_the_cop_is_below_the_true_com(
 
 
 @pytest.mark.parametrize("doing", [Doing.SHIFT, Doing.LIFT, Doing.MOVE, Doing.HOLD, Doing.LOWER])
-def test_abort_in_every_passage_leads_to_a_stand_on_both_feet(
-    doing: Doing, plans: tuple[FootPlan, ...], world: World
-):
+def test_abort_in_every_passage_leads_to_a_stand_on_both_feet(doing: Doing, plans: tuple[FootPlan, ...], world: World):
     experiment = Experiment(ROBOT, [replace(plans[0], visits=plans[0].visits[:1])])
     since = 0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_ways_begin_and_end_at_their_postures_without_gaps(roads: RoadMap):
     assert way is not None
     assert way[0].position(0.0) == pytest.approx(roads.postures[3].joint_positions)
     assert way[-1].position(1.0) == pytest.approx(roads.postures[7].joint_positions)
-    for one, next_one in zip(way, way[1:], strict=False):
+    for one, next_one in pairwise(way):
         assert one.position(1.0) == pytest.approx(next_one.position(0.0))
 
 
