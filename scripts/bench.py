@@ -25,6 +25,7 @@ from tulip_sim.bench import (
     challenges,
     clik,
     control,
+    dynamics,
     head,
     ilc,
     kick,
@@ -45,7 +46,7 @@ from tulip_sim.bench.runner import Row, run, save, write_results
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress),
-    *(simcheck, vision, localization, ball, head, latency, log),
+    *(simcheck, vision, localization, ball, head, latency, log, dynamics),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"

@@ -217,7 +217,7 @@ class _Problem:
         self._nuisance = np.zeros((len(self._cop), len(self._disturbances)))
 
     def solve(self, start: Array) -> tuple[Array, Array, float, float]:
-        """Return the unknowns with beta, o, k, their covariance, s, and chi^2 without s; start is (r,) theta_b for c_z."""
+        """Return unknowns with beta, o, k, their covariance, s, and chi^2 without s; start: (r,) theta_b for c_z."""
         unknown = self._unknown
         values = np.append(start[:unknown], np.zeros(len(self._disturbances)))
         for _ in range(ROUNDS):
