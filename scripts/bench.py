@@ -27,6 +27,7 @@ from tulip_sim.bench import (
     control,
     dynamics,
     head,
+    identify,
     ilc,
     kick,
     latency,
