@@ -47,7 +47,7 @@ from tulip_sim.bench.runner import Row, run, save, write_results
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress),
-    *(simcheck, vision, localization, ball, head, latency, log, dynamics),
+    *(simcheck, vision, localization, ball, head, latency, log, identify, dynamics),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"
