@@ -41,6 +41,7 @@ class ExperimentParameters:
     stand_time: float = 1.5  # [s] at the start, from how the robot stands to the standing posture
     unload_cop: float = 0.010  # [m] of the CoP from its aim at most before the foot lifts
     settle_cop: float = 0.0015  # [m] before averaging begins
+    settle_patience: float = 4.0  # [s] for that; a robot that is still is then measured with its CoP where it is
     pace: Pace = field(default_factory=Pace)
     averaging: AveragingParameters = field(default_factory=AveragingParameters)
     balance: OneFootParameters = field(default_factory=OneFootParameters)
@@ -169,7 +170,8 @@ class Experiment:
         side: SideName = "left" if now.stance is Side.LEFT else "right"
         still = self._gate.is_still(sensors, self._control.body.cop)
         if self._average is None:
-            if still and np.abs(self._gate.cop - self._control.aims[now.stance]).max() < p.settle_cop:
+            centred = np.abs(self._gate.cop - self._control.aims[now.stance]).max() < p.settle_cop
+            if still and (centred or self._elapsed > p.settle_patience):
                 self._average, self._averaging_since = HoldAverage(self._robot, side), sensors.stamp
             elif self._elapsed >= now.time:
                 self._left_out.append(now.posture)

@@ -39,7 +39,7 @@ class OneFootParameters:
     cop_gain: float = 0.8  # [1/s] of the CoP's error that the ankle takes away
     cop_smoothing: float = 0.5  # [s] of the CoP before that: the sway of 1 Hz, which moves it most, is not to be fed
     pendulum_height: float = 0.67  # [m] of the CoM above the ankle: 1 mrad there moves the CoP by so many mm
-    most_correction: float = 0.08  # [rad] of each ankle axis: a CoM that is off by 50 mm
+    most_correction: float = 0.12  # [rad] of each ankle axis: a CoM that is off by 80 mm
     sway_damping: float = 70.0  # [N m s/rad] half of critical for 12 kg m^2 on 600 N m/rad
     sway_smoothing: float = 0.05  # [s] of the CoM's velocity; encoders of 1e-4 rad make 1 mm/s then
 
