@@ -19,7 +19,8 @@ from tulip_description.robot import Robot, load_robot
 from tulip_motion.identification.body_comparison import base_values, com_rows, rms
 from tulip_motion.identification.body_prior import Spread
 from tulip_motion.identification.com_identification import ComIdentification, IdentificationSettings, identify_com
-from tulip_motion.identification.experiment_settings import ExperimentSettings, make_experiment
+from tulip_motion.identification.experiment import Experiment
+from tulip_motion.identification.experiment_plan import make_plan
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.physical_consistency import as_body, most_probable_body
 from tulip_sim.bench.identify_walk import (
@@ -70,8 +71,7 @@ def measure(case: str, seed: int) -> Row:
     true_body = listed if case == TABLE else secret_body(listed, np.random.default_rng(seed))
     settings = IdentificationSettings(spread=Spread(unlisted=UNLISTED)) if case == TABLE else IdentificationSettings()
     world = World(Scenario(robot=START, ball=(0.0, -2.5), poles=False), WORLD, seed, true_body=true_body)
-    # The postures are planned and held with what is believed; their CoP tells by how much that is wrong.
-    experiment = make_experiment(ExperimentSettings())
+    experiment = Experiment(believed, make_plan(believed))
     end = run_experiment(experiment, world)
     row: Row = {
         "case": case,
