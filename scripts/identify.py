@@ -18,6 +18,7 @@ import numpy as np
 import typer
 from _progress import progress
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from tulip_description.body_file import BodySource, read_body, write_body
@@ -128,12 +129,9 @@ def fit(
     _print_table(console, "The most probable body with it", tables.LINK_HEADINGS, tables.link_rows(found, whole))
     x, y = (1e3 * tables.com_difference(found.prior, whole.robot)).tolist()
     console.print(f"mass              {found.mass:.2f} kg (believed: {believed.mass:.2f} kg)")
-    console.print(
-        f"CoM               believed wrongly by {x:.1f} mm forwards, {y:.1f} mm sideways (RMS of all postures)"
-    )
-    console.print(
-        f"IMU mounted askew {', '.join(f'{1e3 * angle:+.1f}' for angle in found.mount.tolist())} mrad about x, y"
-    )
+    console.print(f"CoM               was off by {x:.1f} mm forwards, {y:.1f} mm sideways (RMS of all postures)")
+    about_x, about_y = (1e3 * found.mount).tolist()
+    console.print(f"IMU               mounted askew by {about_x:+.1f} mrad about x, {about_y:+.1f} mrad about y")
     console.print(f"left over         {1e3 * found.model_error:.2f} mm of each CoP, beside the cells' noise")
     console.print(f"written           {output}", soft_wrap=True, highlight=False)
 
@@ -146,8 +144,8 @@ def validate(
 ) -> None:
     """Foretell the CoP of other postures with a body file, beside robot.yaml.
 
-    The exit code is 0 if the body foretells them better and its covariance explains what is left, 1 if not, 2 for bad
-    input.
+    The exit code is 0 if the body foretells them better and its covariance is not too small for what is left, 1 if not,
+    2 for bad input.
     """
     console = Console()
     try:
@@ -164,7 +162,7 @@ def validate(
     except (BadInputError, ValueError) as error:
         _refuse(error)
     _tell_validation(console, found)
-    raise typer.Exit(0 if found.honest and found.rms < found.prior_rms else 1)
+    raise typer.Exit(1 if found.too_sure or found.rms > found.prior_rms else 0)
 
 
 @app.command()
@@ -220,12 +218,12 @@ def _tell_validation(console: Console, found: Validation) -> None:
         f"foretold CoP of {len(found.residuals)} other postures: off by {1e3 * found.rms:.2f} mm (RMS),"
         f" before {1e3 * found.prior_rms:.2f} mm"
     )
-    verdict = "honest" if found.honest else "NOT honest"
+    verdict = "too small" if found.too_sure else "honest" if found.nees >= low else "too large, as for fitted postures"
     console.print(f"covariance {verdict}: NEES {found.nees:.2f}, expected {low:.2f} to {high:.2f}")
 
 
 def _print_table(console: Console, title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    table = Table(*headings, title=title)
+    table = Table(*map(escape, headings), title=title)
     for row in rows:
         table.add_row(*row)
     console.print(table)

@@ -54,9 +54,9 @@ class Validation:
         return _rms(self.prior_residuals)
 
     @property
-    def honest(self) -> bool:
-        """Whether the covariance explains the residuals, neither more nor less than it should."""
-        return self.bounds[0] <= self.nees <= self.bounds[1]
+    def too_sure(self) -> bool:
+        """Whether the covariance is too small to explain the residuals."""
+        return self.nees > self.bounds[1]
 
 
 def validate(
