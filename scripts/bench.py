@@ -80,7 +80,8 @@ def main(
 
         def done(row: Row) -> None:
             bar.advance(task)
-            console.print("  ".join(f"{key} {value}" for key, value in row.items()), highlight=False, soft_wrap=True)
+            figures = (f"{key} {value}" for key, value in row.items() if not isinstance(value, list | dict))
+            console.print("  ".join(figures), highlight=False, soft_wrap=True, markup=False)
 
         rows = run(bench, workers, done)
     save(bench, rows, DOCS / "results")
