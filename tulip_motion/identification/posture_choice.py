@@ -1,6 +1,6 @@
 """Which postures to hold: the D-optimal choice from many candidates.
 
-Each posture gives two rows W, the CoP by the base parameters and by the angles at which the IMU is mounted, eq. (2e).
+Each posture gives two rows W, the CoP by the base parameters and by the angles at which the IMU is mounted, eq. (2d).
 With equal errors of all CoPs, the covariance of what is sought is proportional to (sum W^T W)^-1; its determinant, the
 volume of the ellipsoid of uncertainty, is smallest for the set that maximizes log det sum W^T W. Exchanging one posture
 at a time finds a set that no exchange improves (Fedorov, Theory of Optimal Experiments, 1972).

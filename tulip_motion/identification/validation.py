@@ -77,7 +77,7 @@ def validate(
         prior: The robot file's robot; gives the kinematics.
         values: (r,) base parameters theta_b of eq. (2), by the whole mass [m].
         covariance: (r, r) of these [m^2].
-        model_error: s of eq. (2e) [m].
+        model_error: s of eq. (2d) [m].
         measurements: Of postures that were not used for the fit.
         settings: What is taken for granted.
 
