@@ -44,12 +44,7 @@ class Monitor:
         """Return how many messages [1/s] a node takes in, by topic."""
         if name not in self._heard:
             return {}
-        pairs = ((pair.key, pair.value) for pair in self._heard[name][1].values)
-        return {
-            key.removeprefix("rate ").removesuffix(" [1/s]"): float(value)
-            for key, value in pairs
-            if key.startswith("rate ")
-        }
+        return rates_of(self._heard[name][1])
 
     def table(self, states: Sequence[ProcessState]) -> Table:
         """Return a table of all processes."""
@@ -69,3 +64,12 @@ class Monitor:
                 self.message(state.name) if state.state == "running" else "",
             )
         return table
+
+
+def rates_of(status: DiagnosticStatus) -> dict[str, float]:
+    """Return how many messages [1/s] a node takes in, by topic."""
+    return {
+        pair.key.removeprefix("rate ").removesuffix(" [1/s]"): float(pair.value)
+        for pair in status.values
+        if pair.key.startswith("rate ")
+    }

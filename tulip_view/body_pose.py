@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -67,7 +69,7 @@ def turned(poses: Array, yaw: Array) -> Array:
     return np.column_stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z])
 
 
-def pose_row(pose: object) -> tuple[float, ...]:
+def pose_row(pose: Any) -> tuple[float, ...]:
     """Return position and quaternion x, y, z, w of a geometry_msgs/Pose."""
-    p, q = pose.position, pose.orientation  # type: ignore[attr-defined]
+    p, q = pose.position, pose.orientation
     return (p.x, p.y, p.z, q.x, q.y, q.z, q.w)

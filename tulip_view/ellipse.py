@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,18 +32,18 @@ def ellipse(centre: Array, covariance: Array) -> Array | None:
     return points
 
 
-def robot_ellipse(world: object) -> Array | None:
+def robot_ellipse(world: Any) -> Array | None:
     """Return the ellipse of the robot's place in the map, of a WorldState message; see `ellipse`."""
-    covariance = np.asarray(world.robot_covariance).reshape(3, 3)  # type: ignore[attr-defined]
-    return ellipse(np.asarray(world.robot_pose, dtype=float)[:2], covariance[:2, :2])  # type: ignore[attr-defined]
+    covariance = np.asarray(world.robot_covariance).reshape(3, 3)
+    return ellipse(np.asarray(world.robot_pose, dtype=float)[:2], covariance[:2, :2])
 
 
-def ball_ellipse(world: object) -> Array | None:
+def ball_ellipse(world: Any) -> Array | None:
     """Return the ellipse of the ball's place in the map, of a WorldState message that knows a ball; see `ellipse`.
 
     Of the ball as seen from the robot: where the robot itself is not sure, the ball is in the map neither.
     """
-    ball = world.ball  # type: ignore[attr-defined]
-    turn = Pose2D(0.0, 0.0, float(world.robot_pose[2])).rotation()  # type: ignore[attr-defined]
+    ball = world.ball
+    turn = Pose2D(0.0, 0.0, float(world.robot_pose[2])).rotation()
     spread = turn @ np.asarray(ball.covariance).reshape(4, 4)[:2, :2] @ turn.T
     return ellipse(np.asarray(ball.position_in_map, dtype=float), spread)

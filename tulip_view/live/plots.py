@@ -1,0 +1,56 @@
+"""Diagrams of the page: curves of the last seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+from viser import uplot
+
+from tulip_view.live.inputs import WINDOW
+from tulip_view.live.shapes import Array
+
+HEIGHT = 190  # [px]
+
+
+class Plot:
+    """Lines over time."""
+
+    def __init__(self, server: viser.ViserServer, title: str, lines: Sequence[tuple[str, str]]) -> None:
+        """Add an empty diagram.
+
+        Args:
+            server: Of the page.
+            title: With the unit.
+            lines: Name and colour of each line.
+        """
+        empty = tuple(np.zeros(2) for _ in range(1 + len(lines)))
+        styles = [uplot.Series(label=name, stroke=colour, width=1.5) for name, colour in lines]
+        self._handle = server.gui.add_uplot(
+            empty,
+            (uplot.Series(label="s"), *styles),
+            title=title,
+            scales={"x": uplot.Scale(time=False)},
+            height=HEIGHT,
+        )
+
+    def draw(self, times: Array, lines: Sequence[Array]) -> None:
+        """Draw curves.
+
+        Args:
+            times: (n,) [s].
+            lines: (n,) of each line; what is NaN is not drawn.
+        """
+        if len(times) < 2:
+            times, lines = np.array([0.0, WINDOW]), [np.full(2, np.nan)] * len(lines)
+        data = (times, *(_drawable(line) for line in lines))
+        old = self._handle.data
+        if not all(np.array_equal(new, before, equal_nan=True) for new, before in zip(data, old, strict=True)):
+            self._handle.data = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in data)
+
+
+def _drawable(line: Array) -> NDArray[np.float64]:
+    """Return a line that the browser's library can scale: it takes NaN for a number where a whole line has no other."""
+    return np.zeros(len(line)) if np.isnan(line).all() else line
