@@ -19,33 +19,29 @@ import typer
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
 from tulip_ros.plan import check_namespace
 from tulip_ros.run import session
-from tulip_view.live.server import LOOPBACK
-from tulip_view.live.view_log import show_recording
-from tulip_view.live.view_node import ViewNode, ViewParameters
+from tulip_view.live.beside import PORT, address, check_installed
 
 
 def main(
     recording: Annotated[
         Path | None, typer.Argument(help="Folder or MCAP file of a recording; none: the robot that runs.")
     ] = None,
-    port: Annotated[int, typer.Option(help="TCP port of the page.", min=1, max=65535)] = ViewParameters.port,
+    port: Annotated[int, typer.Option(help="TCP port of the page.", min=1, max=65535)] = PORT,
     robot: Annotated[str | None, typer.Option(help="Namespace of the robot to begin with, as in striker.")] = None,
     lan: Annotated[
-        bool,
-        typer.Option("--lan", help="Let other computers open the page: all in the network can steer the robot."),
+        bool, typer.Option("--lan", help="Let other computers open the page: all in the network can steer the robot.")
     ] = False,
 ) -> None:
     """Serve the page until Ctrl-C; open its address in a browser."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        if recording is not None:
+        check_installed()
+        if recording is None:
+            show_running(check_namespace(robot or ""), port, lan)
+        else:
+            from tulip_view.live.view_log import show_recording
+
             show_recording(recording, robot, port, lan, lambda: tell(port, lan), threading.Event())
-            return
-        settings = ViewParameters(port, lan, check_namespace(robot or ""))
-        with session(lambda: ViewNode(settings), arguments=[], handle_signals=False) as (node, spin):
-            tell(port, lan)
-            while True:
-                node.advance(spin)
     except BadInputError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from None
@@ -53,9 +49,20 @@ def main(
         print("page closed")
 
 
+def show_running(robot: str, port: int, lan: bool) -> None:
+    """Serve the page of a running robot."""
+    from tulip_view.live.view_node import ViewNode, ViewParameters
+
+    settings = ViewParameters(port, lan, robot)
+    with session(lambda: ViewNode(settings), arguments=[], handle_signals=False) as (node, spin):
+        tell(port, lan)
+        while True:
+            node.advance(spin)
+
+
 def tell(port: int, lan: bool) -> None:
     """Say where the page is, and who can open it."""
-    print(f"open http://{LOOPBACK}:{port} in a browser; Ctrl-C ends", flush=True)
+    print(f"open {address(port)} in a browser; Ctrl-C ends", flush=True)
     if lan:
         print(
             f"--lan: every computer in the network can open http://{socket.gethostname()}:{port} and command the robot;"

@@ -62,18 +62,20 @@ def joint_curves(buffers: Buffers, joint: str) -> JointCurves:
     index = LEG_JOINTS.index(joint)
     states = buffers.kept(topics.MOTION_STATE)
     times = np.array([stamp for stamp, _ in states])
-    columns = [
-        np.array([getattr(message, field)[index] for _, message in states], dtype=float)
-        for field in (
-            "joint_positions_desired",
-            "joint_positions",
-            "torque_feedback",
-            "torque_feedforward",
-            "torque_learned",
-        )
-    ]
+
+    def column(field: str) -> Array:
+        return np.array([getattr(message, field)[index] for _, message in states], dtype=np.float64)
+
     sensed = [(stamp, _named(message, joint, "effort")) for stamp, message in buffers.kept(topics.JOINT_STATES)]
-    return JointCurves(times, *columns, _at(times, sensed))
+    return JointCurves(
+        times,
+        column("joint_positions_desired"),
+        column("joint_positions"),
+        column("torque_feedback"),
+        column("torque_feedforward"),
+        column("torque_learned"),
+        _at(times, sensed),
+    )
 
 
 def _named(message: Any, joint: str, field: str, names: str = "name") -> float:

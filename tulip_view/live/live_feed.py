@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -49,7 +50,7 @@ class LiveFeed:
         self._intake = Intake(scene)
         self._scene = scene
         self._picture: Topic | None = topics.CAMERA_COMPRESSED
-        self._ears: dict[str, Subscription] = {}
+        self._ears: dict[str, tuple[str, Subscription]] = {}  # by full name, with the name in INPUTS
         self.robot = robot
 
     @property
@@ -69,9 +70,10 @@ class LiveFeed:
         Args:
             name: One of `PICTURES`.
         """
-        for topic in PICTURES.values():
-            if topic is not None and topic is not PICTURES[name]:
-                self._close(topic.name)
+        for full, (topic_name, _) in list(self._ears.items()):
+            topic = INPUTS[topic_name].topic
+            if topic.quality is topics.PICTURE and topic is not PICTURES[name]:
+                self._close(full)
                 self._scene.forget(topic)
         self._picture = PICTURES[name]
 
@@ -79,16 +81,15 @@ class LiveFeed:
         """Take what has come since the last time; begin to listen if need be. Return False: time only goes on."""
         if not self._ears and not self.robot:
             self.robot = min(self._publishing(), default="", key=lambda name: (name != "", name != "striker", name))
-        for name, entry in INPUTS.items():
+        for entry in INPUTS.values():
             if entry.topic.quality is topics.PICTURE and entry.topic is not self._picture:
                 continue
-            if name not in self._ears:
-                seldom = entry.topic.quality.latched or entry.topic.quality is topics.PICTURE
-                self._ears[name] = entry.topic.within(self.robot).subscribe_from(
-                    self._node, lambda message: None, raw=True, depth=1 if seldom else DEPTH
-                )
+            # Nodes that are of no robot, as the simulator of a match, tell of themselves outside all namespaces.
+            outside = ("",) if entry.topic is topics.DIAGNOSTICS else ()
+            for robot in dict.fromkeys((self.robot, *outside)):
+                self._listen(entry.topic, robot)
         now = time.monotonic()
-        for name, ear in self._ears.items():
+        for name, ear in self._ears.values():
             kind = INPUTS[name].topic.message
             while (data := _taken(ear)) is not None:
                 self._intake.take(name, data, now, partial(deserialize_message, data, kind))
@@ -100,9 +101,18 @@ class LiveFeed:
 
     def rest(self) -> None:
         """Stop listening, and forget: nobody looks."""
-        for name in list(self._ears):
-            self._close(name)
+        for full in list(self._ears):
+            self._close(full)
         self._intake.begin_anew()
+
+    def _listen(self, topic: Topic, robot: str) -> None:
+        full = f"/{topic.within(robot).name}"
+        if full not in self._ears:
+            seldom = topic.quality.latched or topic.quality is topics.PICTURE
+            ear = replace(topic, name=full).subscribe_from(
+                self._node, lambda message: None, raw=True, depth=1 if seldom else DEPTH
+            )
+            self._ears[full] = topic.name, ear
 
     def _publishing(self) -> set[str]:
         return {
@@ -112,10 +122,9 @@ class LiveFeed:
             if full.endswith(f"/{name}")
         }
 
-    def _close(self, name: str) -> None:
-        ear = self._ears.pop(name, None)
-        if ear is not None:
-            self._node.destroy_subscription(ear)
+    def _close(self, full: str) -> None:
+        _, ear = self._ears.pop(full)
+        self._node.destroy_subscription(ear)
 
 
 def _taken(ear: Subscription) -> bytes | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from typing import Any
 
+from tulip_ros import topics
 from tulip_ros.log_file import Log, Record
 from tulip_view.live.inputs import INPUTS, WINDOW, not_shown
 from tulip_view.live.intake import Intake
@@ -52,6 +53,9 @@ class LogFeed:
         self.robot = robot
         self._names, self._remarks = full_names(self._log, robot, INPUTS)
         self._names = {full: name for full, name in self._names.items() if name in INPUTS}
+        shared = f"/{topics.DIAGNOSTICS.name}"  # of nodes that are of no robot, as the simulator of a match
+        if shared in self._log.topics:
+            self._names.setdefault(shared, topics.DIAGNOSTICS.name)
         latched = [
             full
             for full, name in self._names.items()

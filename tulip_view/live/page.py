@@ -76,7 +76,7 @@ class Page:
         look = gui.add_button_group("look at", ("field", "robot"), order=-0.5)
 
         @look.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle[str]]) -> None:
+        def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
             if event.client is not None:
                 self._look(event.client, look.value)
 
@@ -120,7 +120,7 @@ class Page:
         names = tuple(robot or ALONE for robot in self._source.robots)
         if names != tuple(self._robots.options):
             self._robots.options = names
-            self._robots.value = self._source.robot or ALONE
+            self._robots.value = self._source.robot or ALONE  # type: ignore[misc]  # its setter takes other types
 
     def _look(self, client: viser.ClientHandle, what: str) -> None:
         body = self._scene.estimate() or self._scene.truth()

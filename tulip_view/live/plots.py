@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 from viser import uplot
 
 from tulip_view.live.inputs import WINDOW
@@ -43,14 +42,9 @@ class Plot:
             times: (n,) [s].
             lines: (n,) of each line; what is NaN is not drawn.
         """
-        if len(times) < 2:
-            times, lines = np.array([0.0, WINDOW]), [np.full(2, np.nan)] * len(lines)
-        data = (times, *(_drawable(line) for line in lines))
+        if len(times) < 2 or all(np.isnan(line).all() for line in lines):  # it must find a scale
+            times, lines = np.array([0.0, WINDOW]), [np.zeros(2) for _ in lines]
+        data = (times, *lines)
         old = self._handle.data
         if not all(np.array_equal(new, before, equal_nan=True) for new, before in zip(data, old, strict=True)):
             self._handle.data = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in data)
-
-
-def _drawable(line: Array) -> NDArray[np.float64]:
-    """Return a line that the browser's library can scale: it takes NaN for a number where a whole line has no other."""
-    return np.zeros(len(line)) if np.isnan(line).all() else line

@@ -166,14 +166,14 @@ class Scene:
         """Return what is around the robot."""
         with self._lock:
             world, truth = self._buffers.newest(topics.WORLD_STATE), self._buffers.newest(topics.GROUND_TRUTH)
-        ball = world is not None and world.ball_known
+        ball = world.ball if world is not None and world.ball_known else None
         others = [] if truth is None else [*([truth.keeper] if truth.keeper_present else []), *truth.obstacles]
         rows = [pose_row(other) for other in others]
         return Around(
             pose=Pose2D(*(float(value) for value in world.robot_pose)) if world is not None else None,
             robot_spread=robot_ellipse(world) if world is not None else None,
-            ball_spread=ball_ellipse(world) if ball else None,
-            ball=np.array(world.ball.position_in_map, dtype=float) if ball else None,
+            ball_spread=ball_ellipse(world) if ball is not None else None,
+            ball=np.array(ball.position_in_map, dtype=np.float64) if ball is not None else None,
             opponents=np.array([each.position_in_map for each in world.opponents] if world is not None else [])
             .reshape(-1, 2)
             .astype(float),

@@ -75,7 +75,7 @@ class TimePanel:
             return True
         if self._playing:
             self._feed.advance(elapsed * SPEEDS[self._speed.value])
-            self._slider.value = round(self._feed.position, 3)
+            self._slider.value = round(self._feed.position, 3)  # type: ignore[misc]  # its setter takes other types
             if self._feed.ended:
                 self._play(False)
         return False

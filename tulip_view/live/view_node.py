@@ -11,6 +11,7 @@ from rclpy.node import Node
 from tulip_description.field import load_field
 from tulip_description.robot import load_robot
 from tulip_ros.run import ComponentNode, run
+from tulip_view.live.beside import PORT
 from tulip_view.live.live_feed import PICTURES, LiveFeed
 from tulip_view.live.page import Page
 from tulip_view.live.scene import Scene
@@ -28,10 +29,10 @@ class ViewParameters:
     Attributes:
         port: TCP port of the page.
         lan: Other computers may open the page, too, and command the robot by it.
-        robot: Namespace of the robot to begin with; "" for the one that is alone, or the first there is.
+        robot: Namespace of the robot to begin with; "" for the node's own, or the first there is.
     """
 
-    port: int = 8080
+    port: int = PORT
     lan: bool = False
     robot: str = ""
 
@@ -57,13 +58,13 @@ class ViewNode(ComponentNode):
         Raises:
             BadInputError: if the port is taken.
         """
-        super().__init__("view", namespace="/")
+        super().__init__("view")
         self.settings = p = self.load(settings or ViewParameters())
         self._server = open_server(p.port, p.lan)
         self._scene = Scene(load_robot())
         # What is polled must be on a node that no executor serves; both share one participant of the middleware.
-        self._ears = Node("view_inputs", namespace="/", enable_rosout=False, start_parameter_services=False)
-        self._feed = LiveFeed(self._ears, self._scene, p.robot.strip("/"))
+        self._ears = Node("view_inputs", enable_rosout=False, start_parameter_services=False)
+        self._feed = LiveFeed(self._ears, self._scene, (p.robot or self.get_namespace()).strip("/"))
         self._calls: dict[str, UserCalls] = {}
         self._steer = SteerPanel(self._server, self._current_calls, self._heading)
         self._page = Page(self._server, self._scene, load_field(), self._feed)
