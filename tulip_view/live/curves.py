@@ -87,7 +87,7 @@ def _at(times: Array, rows: list[tuple[float, float]]) -> Array:
     if not rows or not len(times):
         return np.full(len(times), np.nan)
     stamps, values = np.array(rows).T
-    found: Array = np.interp(times, stamps, values, left=np.nan, right=values[-1])
+    found: Array = np.interp(times, stamps, values)
     return found
 
 

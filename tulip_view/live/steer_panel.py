@@ -18,6 +18,8 @@ WIDTH = 270  # [px]
 PUSHES = {"forward": 0.0, "to the left": 90.0, "backward": 180.0, "to the right": -90.0}
 """Directions as the robot sees them [deg]."""
 LIMP = "LIMP (emergency stop)"
+LIMP_WISH = Wish(UserRequest.LIMP)
+AS_IT_IS = "as it is"
 
 
 class SteerPanel:
@@ -33,23 +35,19 @@ class SteerPanel:
         """
         self._calls = calls
         gui = server.gui
-        emergency = gui.add_panel()
-        with emergency.add_tab("Emergency"):
-            limp = gui.add_button(LIMP, color="red", hint="Legs without stiffness, at once. Key: L")
-        emergency.dock_left()
-        emergency.set_width(WIDTH)
-        emergency.set_height(120)
-        self._on(limp, Wish(UserRequest.LIMP))
-        gui.add_command("Limp: legs without stiffness", hotkey="L").on_trigger(
-            lambda _: calls().wish(Wish(UserRequest.LIMP))
-        )
-        panel = gui.add_panel()
-        with panel.add_tab("Steer"):
-            self._answer = gui.add_html("")
-            strategy = gui.add_dropdown("strategy", ("as it is", *STRATEGIES))
-            start = gui.add_button("Start", color="green", hint="Obey the referee and play")
+        always = gui.add_panel()
+        with always.add_tab("Steer"):
+            self._on(gui.add_button(LIMP, color="red", hint="Legs without stiffness, at once. Key: L"), LIMP_WISH)
             self._on(gui.add_button("Stop", hint="Stop and stand, whatever the referee says"), Wish(UserRequest.STOP))
             self._on(gui.add_button("Stand", hint="Stand up straight"), Wish(UserRequest.STAND))
+            strategy = gui.add_dropdown("strategy", (AS_IT_IS, *STRATEGIES))
+            start = gui.add_button("Start", color="green", hint="Obey the referee and play")
+            self._answer = gui.add_html("")
+        always.dock_left()
+        always.set_width(WIDTH)
+        gui.add_command("Limp: legs without stiffness", hotkey="L").on_trigger(lambda _: calls().wish(LIMP_WISH))
+        tests = gui.add_panel()  # of its own: however long it is, the buttons above stay in sight
+        with tests.add_tab("Test"):
             with gui.add_folder("Walk test", expand_by_default=False):
                 sliders = [
                     gui.add_slider(name, -limit, limit, 0.05, 0.0)
@@ -69,11 +67,11 @@ class SteerPanel:
                 push = gui.add_button("Push the trunk")
             with gui.add_folder("Recording", expand_by_default=False):
                 begin, end = gui.add_button("Begin a recording"), gui.add_button("End the recording")
-        panel.dock_below(emergency)
+        tests.dock_below(always)
 
         @start.on_click
         def _(event: object) -> None:
-            name = "" if strategy.value not in STRATEGIES else strategy.value
+            name = "" if strategy.value == AS_IT_IS else strategy.value
             calls().wish(Wish(UserRequest.PLAY, strategy=name))
 
         @walk.on_click
