@@ -16,10 +16,10 @@ from typing import Annotated
 
 import typer
 
-from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
+from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, require
 from tulip_ros.plan import check_namespace
 from tulip_ros.run import session
-from tulip_view.live.beside import PORT, address, check_installed
+from tulip_view.live.beside import LIBRARY, PORT, address
 
 
 def main(
@@ -35,7 +35,7 @@ def main(
     """Serve the page until Ctrl-C; open its address in a browser."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        check_installed()
+        require(*LIBRARY)
         if recording is None:
             show_running(check_namespace(robot or ""), port, lan)
         else:

@@ -96,7 +96,7 @@ def test_a_page_beside_a_robot_is_one_more_node_outside_all_namespaces():
 
 
 def test_a_missing_library_is_named_with_the_remedy(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(beside, "LIBRARY", "no_such_library")
+    monkeypatch.setattr(beside, "LIBRARY", ("no_such_library", "view"))
     with pytest.raises(BadInputError, match=r"no_such_library.*\.\[view\]"):
         beside.page_beside(8123)
 

@@ -281,13 +281,13 @@ def test_time_that_begins_anew_forgets_what_was_before_and_drops_what_comes_late
 
 def test_a_node_that_says_nothing_is_silent_and_its_words_are_no_markup(scene: Scene):
     def status(name: str, level: bytes, message: str) -> DiagnosticArray:
-        values = [KeyValue(key="rate imu [1/s]", value="249.6"), KeyValue(key="cpu [%]", value="12")]
+        values = [KeyValue(key="rate imu [1/s]", value="249.6"), KeyValue(key="processor [%]", value="12")]
         return DiagnosticArray(status=[DiagnosticStatus(name=name, level=level, message=message, values=values)])
 
     scene.take(topics.DIAGNOSTICS.name, status("old", DiagnosticStatus.OK, "running"), 10.0)
     scene.take(topics.DIAGNOSTICS.name, status("bad", DiagnosticStatus.WARN, "<b>x</b>"), 10.0 + SILENT + 0.1)
     told = scene.told(words.health)
-    assert "silent" in told and "warning" in told and "250/s imu" in told and "cpu [%] 12" in told
+    assert "silent" in told and "warning" in told and "250/s imu" in told and "processor [%] 12" in told
     assert "<b>x</b>" not in told and "&lt;b&gt;x" in told
 
 

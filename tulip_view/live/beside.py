@@ -2,26 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
-
-from tulip_ros.errors import BadInputError
+from tulip_ros.errors import require
 from tulip_ros.plan import Start, make_plan
 
-LIBRARY = "viser"
 PORT = 8080
-
-
-def check_installed() -> None:
-    """Check that the page's library is there.
-
-    Raises:
-        BadInputError: if not.
-    """
-    if importlib.util.find_spec(LIBRARY) is None:
-        raise BadInputError(
-            f"The page needs the library {LIBRARY}, which is not installed. Install the project's extra `view`: "
-            "pip install -e '.[view]'"
-        )
+LIBRARY = ("viser", "view")
+"""That the page needs, and the project's extra that brings it."""
 
 
 def page_beside(port: int, robot: str = "") -> tuple[Start, ...]:
@@ -34,7 +20,7 @@ def page_beside(port: int, robot: str = "") -> tuple[Start, ...]:
     Raises:
         BadInputError: if the page's library is missing.
     """
-    check_installed()
+    require(*LIBRARY)
     return make_plan(["view"], None, values={"view": {"port": port, "robot": robot}})
 
 

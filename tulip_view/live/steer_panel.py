@@ -12,6 +12,7 @@ from tulip_strategy.behaviour.tree import STRATEGIES
 from tulip_strategy.interface import UserRequest
 from tulip_strategy.menu import Wish
 from tulip_strategy.user_input import SIDES, UserInputParameters
+from tulip_view.live.info_panel import STYLE
 from tulip_view.live.user_calls import UserCalls
 
 WIDTH = 270  # [px]
@@ -89,7 +90,7 @@ class SteerPanel:
 
     def tell(self, words: str) -> None:
         """Show what came of a wish."""
-        self._answer.content = f"<b>{escape(words)}</b>"
+        self._answer.content = STYLE.format(f"<b>{escape(words)}</b>")
 
     def _on(self, button: viser.GuiButtonHandle, wish: Wish) -> None:
         button.on_click(lambda _: self._calls().wish(wish))

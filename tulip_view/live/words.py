@@ -20,7 +20,7 @@ MARKS = {
     NodeStatus.IDLE: (DIM, " "),
     NodeStatus.RUNNING: (YELLOW, "▶"),
     NodeStatus.SUCCESS: (GREEN, "✓"),
-    NodeStatus.FAILURE: (RED, "✗"),
+    NodeStatus.FAILURE: (DIM, "✗"),  # the branches that do not apply: nothing to worry about
 }
 LEVELS = {
     DiagnosticStatus.OK: ("ok", GREEN),
@@ -29,7 +29,7 @@ LEVELS = {
     DiagnosticStatus.STALE: ("stale", RED),
 }
 REQUESTS = {request.value: request.name.lower().replace("_", " ") for request in UserRequest}
-FIGURES = ("latency", "cpu", "restarts")
+FIGURES = ("latency", "processor", "restarts")
 """Values of a node's diagnostics that are shown beside its rate, by the beginning of their keys."""
 
 
