@@ -44,7 +44,12 @@ class Monitor:
         """Return how many messages [1/s] a node takes in, by topic."""
         if name not in self._heard:
             return {}
-        return rates_of(self._heard[name][1])
+        pairs = ((pair.key, pair.value) for pair in self._heard[name][1].values)
+        return {
+            key.removeprefix("rate ").removesuffix(" [1/s]"): float(value)
+            for key, value in pairs
+            if key.startswith("rate ")
+        }
 
     def table(self, states: Sequence[ProcessState]) -> Table:
         """Return a table of all processes."""
@@ -64,12 +69,3 @@ class Monitor:
                 self.message(state.name) if state.state == "running" else "",
             )
         return table
-
-
-def rates_of(status: DiagnosticStatus) -> dict[str, float]:
-    """Return how many messages [1/s] a node takes in, by topic."""
-    return {
-        pair.key.removeprefix("rate ").removesuffix(" [1/s]"): float(pair.value)
-        for pair in status.values
-        if pair.key.startswith("rate ")
-    }

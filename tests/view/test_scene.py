@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion
+from geometry_msgs.msg import Point, Pose, PoseArray, PoseWithCovariance, Quaternion
 from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
@@ -21,7 +21,6 @@ from tulip_msgs.msg import BehaviourTree, GameState, MotionState, ObjectEstimate
 from tulip_ros import topics
 from tulip_ros.errors import BadInputError
 from tulip_ros.log_file import Log
-from tulip_ros.monitor import SILENT
 from tulip_ros.time import header
 from tulip_ros.topics import Topic
 from tulip_view.body_pose import COLOURS
@@ -35,6 +34,7 @@ from tulip_view.live.log_feed import LogFeed
 from tulip_view.live.pace import FASTEST, SLOWEST, Pace
 from tulip_view.live.scene import Scene
 from tulip_view.live.shapes import CORNERS, FACES
+from tulip_view.live.words import SILENT
 
 RECORDINGS = Path(__file__).parent.parent / "data" / "recordings"
 MS = 1_000_000  # [ns]
@@ -335,6 +335,18 @@ def test_every_box_has_a_colour():
         part.colour for part in keeper_parts("magenta")
     }
     assert named <= set(COLOURS)
+
+
+def test_planned_footsteps_lie_in_the_map_with_the_size_of_a_sole(scene: Scene):
+    standing(scene)  # where x of odom is -y of the map: the world model turns it by -90 degrees
+    scene.take(topics.FOOTSTEPS.name, PoseArray(header=header(MS), poses=[Pose(position=Point(x=2.0, y=0.0))]), 1.0)
+    (corners,) = scene.footsteps()
+    foot = scene.robot.feet[0]
+    assert (foot.x, foot.y) == (scene.robot.feet[1].x, scene.robot.feet[1].y)  # one shape for both feet
+    middle = corners.mean(axis=0)
+    ahead = (foot.x[0] + foot.x[1]) / 2.0
+    assert middle == pytest.approx((3.0, -2.0 - (1.0 + ahead), 0.0), abs=1e-9)
+    assert np.ptp(corners, axis=0) == pytest.approx((foot.y[1] - foot.y[0], foot.x[1] - foot.x[0], 0.0), abs=1e-9)
 
 
 def test_support_words_follow_the_message(scene: Scene):

@@ -211,6 +211,20 @@ class Scene:
             words=f"{name_of(MODES, motion.mode)}, {name_of(SUPPORTS, support)}",
         )
 
+    def footsteps(self) -> list[Array]:
+        """Return the planned footsteps, the one under way first: (4, 3) corners of each sole."""
+        with self._lock:
+            message, to_map = self._buffers.newest(topics.FOOTSTEPS), self._odom_in_map()
+        feet = self.robot.feet
+        found = []
+        for pose in message.poses if message is not None else ():
+            row = pose_row(pose)
+            place = to_map @ pose_on_ground(row[:2], row[3:])
+            frame = np.eye(4)
+            frame[:2, :2], frame[:2, 3] = place.rotation(), (place.x, place.y)
+            found.append(_corners(feet[0], frame))  # both soles are alike
+        return found
+
     def sight(self) -> Sight | None:
         """Return what the camera saw last, or None where no picture comes."""
         return self.told(lambda buffers: look(buffers, self.robot, self._mount))

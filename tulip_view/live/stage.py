@@ -17,7 +17,7 @@ from tulip_view.live.balance_picture import COLOURS as POINTS
 from tulip_view.live.scene import Balance, Scene
 from tulip_view.live.shapes import Array, Boxes, colour, segments, show
 from tulip_view.report.field_paths import ground_lines
-from tulip_view.report.figures import BLUE, ORANGE, RED, SKY
+from tulip_view.report.figures import BLUE, ORANGE, PURPLE, RED, SKY
 
 GHOST = (150, 150, 150)
 GHOST_OPACITY = 0.35
@@ -64,6 +64,7 @@ class Stage:
                 ("ball_spread", colour(RED), 0.015),
                 ("opponents", colour(SKY), 0.03),
                 ("soles", (250, 250, 250), 0.006),
+                ("footsteps", colour(PURPLE), 0.012),
                 *((name.replace(" ", "_"), rgb, 0.008) for name, rgb in POINTS.items()),
             )
         }
@@ -108,7 +109,9 @@ class Stage:
             boxes.place(_upright(around.true_others[number]) if there else None)
 
     def _balance(self, balance: Balance | None) -> None:
-        self._lines["soles"].draw([] if balance is None else list(balance.soles + np.array((0.0, 0.0, ABOVE))))
+        lift = np.array((0.0, 0.0, ABOVE))
+        self._lines["footsteps"].draw([corners + lift for corners in self._scene.footsteps()])
+        self._lines["soles"].draw([] if balance is None else list(balance.soles + lift))
         points: dict[str, Array] = {}
         if balance is not None:
             points = {

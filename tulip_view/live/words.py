@@ -7,7 +7,6 @@ from html import escape
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from tulip_ros import topics
-from tulip_ros.monitor import SILENT, rates_of
 from tulip_strategy.interface import UserRequest
 from tulip_strategy.messages import tree_from_message, user_command_from_message
 from tulip_strategy.tree_drawing import SIGNS
@@ -29,6 +28,8 @@ LEVELS = {
     DiagnosticStatus.STALE: ("stale", RED),
 }
 REQUESTS = {request.value: request.name.lower().replace("_", " ") for request in UserRequest}
+SILENT = 3.0  # [s] without diagnostics, which come each second
+RATE = "rate "
 FIGURES = ("latency", "processor", "restarts")
 """Values of a node's diagnostics that are shown beside its rate, by the beginning of their keys."""
 
@@ -90,10 +91,11 @@ def health(buffers: Buffers) -> str:
         words, colour = LEVELS.get(status.level, ("unknown", RED))
         if buffers.now - when > SILENT:
             words, colour = "silent", RED
-        rates = rates_of(status)
+        figures = {pair.key: pair.value for pair in status.values}
+        rates = {key.split()[1]: float(value) for key, value in figures.items() if key.startswith(RATE)}
         fastest = max(rates, key=lambda topic: rates[topic], default="")
         shown = [f"{rates[fastest]:.0f}/s {fastest}"] if fastest else []
-        shown += [f"{pair.key} {pair.value}" for pair in status.values if pair.key.lower().startswith(FIGURES)]
+        shown += [f"{key} {value}" for key, value in figures.items() if key.startswith(FIGURES)]
         says = "" if status.message == "running" else f"<br>{escape(status.message)}"
         rows.append(
             f'<tr><td style="vertical-align:top">{escape(name)}</td>'
