@@ -18,15 +18,17 @@ LARGEST = 3.0  # [m] of its half axis; more says no more than "anywhere", and co
 
 
 def ellipse(centre: Array, covariance: Array) -> Array | None:
-    """Return (33, 2) points of the ellipse of SIGMAS standard deviations, or None for one that is too large to tell.
+    """Return (33, 2) points of the ellipse of SIGMAS standard deviations, or None for one that is too large or unknown.
 
     Args:
         centre: (2,) [m].
         covariance: (2, 2) [m^2].
     """
+    if not np.isfinite(covariance).all():
+        return None
     values, vectors = np.linalg.eigh((covariance + covariance.T) / 2.0)
     radii = SIGMAS * np.sqrt(np.maximum(values, 0.0))
-    if not np.isfinite(radii).all() or radii.max() > LARGEST:
+    if radii.max() > LARGEST:
         return None
     points: Array = centre + (np.column_stack([np.cos(TURN), np.sin(TURN)]) * radii) @ vectors.T
     return points

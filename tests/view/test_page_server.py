@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,13 +15,20 @@ import viser
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
+from tulip_description.robot import load_robot
 from tulip_ros.errors import BadInputError
+from tulip_ros.log_file import Log
 from tulip_ros.nodes import NODES
 from tulip_ros.plan import make_plan
 from tulip_view.live import beside
+from tulip_view.live.log_feed import LogFeed
+from tulip_view.live.scene import Scene
 from tulip_view.live.server import REFUSED, is_own, open_server
+from tulip_view.live.time_panel import TimePanel
+from tulip_view.live.view_log import show_recording
 from tulip_view.live.view_node import ViewParameters
 
+WALK = Path(__file__).parent.parent / "data" / "recordings" / "walk" / "walk.mcap"
 PATIENCE = 30.0  # [s]
 
 
@@ -106,13 +114,26 @@ def test_a_port_that_does_not_exist_is_refused():
         ViewParameters(port=70000)
 
 
-def test_a_damaged_recording_is_told_before_anything_is_opened(tmp_path: Path):
-    import threading
-
-    from tulip_view.live.view_log import show_recording
-
+def test_a_recording_that_is_cut_is_refused_with_the_remedy_before_anything_is_opened(tmp_path: Path):
     file = tmp_path / "cut.mcap"
-    whole = Path(__file__).parent.parent / "data" / "recordings" / "walk" / "walk.mcap"
-    file.write_bytes(whole.read_bytes()[:100_000])
+    file.write_bytes(WALK.read_bytes()[:100_000])
     with pytest.raises(BadInputError, match=r"recover\.py"):
         show_recording(file, None, 1, False, lambda: None, threading.Event())
+
+
+def test_damage_inside_a_recording_is_told_on_the_page_and_the_rest_can_still_be_seen(
+    server: viser.ViserServer, tmp_path: Path
+):
+    data = bytearray(WALK.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 64] = bytes(64)
+    file = tmp_path / "damaged.mcap"
+    file.write_bytes(data)
+    with Log(file) as log:
+        scene = Scene(load_robot())
+        panel = TimePanel(server, LogFeed(log, scene))
+        for instant in (11.0, 2.0):
+            panel._wanted = instant
+            panel.update()
+        assert "recover.py" in panel._note.content
+        assert scene.stamp == pytest.approx(2.0, abs=0.05) and scene.estimate() is not None

@@ -123,7 +123,7 @@ def error_curves(buffers: Buffers) -> ErrorCurves:
     covariances = np.array([message.robot_covariance for _, message in worlds], dtype=float).reshape(-1, 3, 3)
     off = believed - np.column_stack([np.interp(times, stamps, column) for column in real.T])
     turn = (off[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
-    widest = np.linalg.eigvalsh(covariances[:, :2, :2])[:, 1]
-    known = (times >= stamps[0] - NEAR) & (times <= stamps[-1] + NEAR)
-    rows = (times, np.hypot(off[:, 0], off[:, 1]), SIGMAS * np.sqrt(np.maximum(widest, 0.0)), turn)
-    return ErrorCurves(*(row[known] for row in rows))
+    known = (times >= stamps[0] - NEAR) & (times <= stamps[-1] + NEAR) & np.isfinite(covariances).all(axis=(1, 2))
+    widest = np.linalg.eigvalsh(covariances[known, :2, :2])[:, 1]
+    claimed = SIGMAS * np.sqrt(np.maximum(widest, 0.0))
+    return ErrorCurves(times[known], np.hypot(off[known, 0], off[known, 1]), claimed, turn[known])

@@ -6,6 +6,7 @@ from bisect import bisect_right
 from typing import Any
 
 from tulip_ros import topics
+from tulip_ros.errors import BadInputError
 from tulip_ros.log_file import Log, Record
 from tulip_view.live.inputs import INPUTS, WINDOW, not_shown
 from tulip_view.live.intake import Intake
@@ -62,8 +63,11 @@ class LogFeed:
             if INPUTS[name].topic.quality.latched and self._log.topics[full].messages <= RARE
         ]
         self._latched: dict[str, list[Record]] = {full: [] for full in latched}
-        for record in self._log.records(latched):
-            self._latched[record.topic.name].append(record)
+        try:
+            for record in self._log.records(latched):
+                self._latched[record.topic.name].append(record)
+        except BadInputError as error:  # the parts that are whole can be looked at all the same
+            self._remarks.append(str(error))
         self.seek(self.position)
 
     def remarks(self) -> list[str]:

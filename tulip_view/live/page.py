@@ -59,6 +59,7 @@ class Page:
         """
         self._server, self._scene, self._source = server, scene, source
         self._stop = threading.Event()
+        self._drawing = threading.Thread(target=self._run, daemon=True)
         self._pace = Pace()
         self._wanted: str | None = None
         server.initial_camera.position = (-2.5, -6.8, 4.6)
@@ -80,8 +81,21 @@ class Page:
             if event.client is not None:
                 self._look(event.client, look.value)
 
-    def run(self) -> None:
-        """Draw until `stop`; for a thread of its own."""
+    def open(self) -> None:
+        """Begin to draw, in a thread of its own."""
+        self._drawing.start()
+
+    def check(self) -> None:
+        """Raise an error where drawing has failed, which its thread has told; call it now and then."""
+        if not self._drawing.is_alive():
+            raise RuntimeError("The page cannot be drawn any more; the error stands above.")
+
+    def close(self) -> None:
+        """End drawing."""
+        self._stop.set()
+        self._drawing.join()
+
+    def _run(self) -> None:
         asker = threading.Thread(target=self._ask, daemon=True)
         asker.start()
         resting = False
@@ -111,10 +125,6 @@ class Page:
             self._stop.wait(max(self._pace.period - worked, 0.0))
         self._source.rest()
         asker.join()
-
-    def stop(self) -> None:
-        """End `run`."""
-        self._stop.set()
 
     def _show_robots(self) -> None:
         names = tuple(robot or ALONE for robot in self._source.robots)

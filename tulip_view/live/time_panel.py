@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import time
+from html import escape
 
 import viser
 
+from tulip_ros.errors import BadInputError
+from tulip_view.live.info_panel import STYLE
 from tulip_view.live.log_feed import LogFeed
 
 SPEEDS = {"1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "4": 4.0}
@@ -32,6 +35,7 @@ class TimePanel:
         with panel.add_tab("Recording"):
             self._slider = gui.add_slider("time [s]", 0.0, max(round(feed.duration, 3), STEP), STEP, 0.0)
             self._button = gui.add_button("Play")
+            self._note = gui.add_html("")
             self._speed = gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1")
         panel.dock_left()
         panel.set_width(300)
@@ -70,15 +74,19 @@ class TimePanel:
         now = time.monotonic()
         elapsed, self._last = min(now - self._last, LONGEST), now
         wanted, self._wanted = self._wanted, None
-        if wanted is not None:
-            self._feed.seek(wanted)
-            return True
-        if self._playing:
-            self._feed.advance(elapsed * SPEEDS[self._speed.value])
+        try:
+            if wanted is not None:
+                self._feed.seek(wanted)
+            elif self._playing:
+                self._feed.advance(elapsed * SPEEDS[self._speed.value])
+        except BadInputError as error:  # damage that lies inside a file shows only when one comes there
+            self._note.content = STYLE.format(f"<b>{escape(str(error))}</b>")
+            self._play(False)
+        if wanted is None and self._playing:
             self._slider.value = round(self._feed.position, 3)  # type: ignore[misc]  # its setter takes other types
             if self._feed.ended:
                 self._play(False)
-        return False
+        return wanted is not None
 
     def rest(self) -> None:
         """Hold: nobody looks."""

@@ -15,6 +15,8 @@ from tulip_view.live.scene import Scene
 from tulip_view.live.server import open_server
 from tulip_view.live.time_panel import TimePanel
 
+LOOK = 0.5  # [s] between two looks whether the page is still drawn
+
 
 def show_recording(
     path: Path, robot: str | None, port: int, lan: bool, ready: Callable[[], None], stop: threading.Event
@@ -37,15 +39,13 @@ def show_recording(
         feed = LogFeed(log, scene, robot)
         server = open_server(port, lan)
         try:
-            source = TimePanel(server, feed)
-            page = Page(server, scene, load_field(), source)
-            drawing = threading.Thread(target=page.run)
-            drawing.start()
+            page = Page(server, scene, load_field(), TimePanel(server, feed))
+            page.open()
             ready()
             try:
-                stop.wait()
+                while not stop.wait(LOOK):
+                    page.check()
             finally:
-                page.stop()
-                drawing.join()
+                page.close()
         finally:
             server.stop()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -71,19 +70,18 @@ class ViewNode(ComponentNode):
         sources = self._page.info.sources
         sources.options, sources.visible = tuple(PICTURES), True
         sources.on_update(lambda _: self._feed.choose_picture(sources.value))
-        self._drawing = threading.Thread(target=self._page.run)
-        self._drawing.start()
+        self._page.open()
 
     def advance(self, spin: Callable[[float], None]) -> None:
         """Handle answers."""
         spin(LOOK)
+        self._page.check()
         for calls in tuple(self._calls.values()):
             calls.check()
 
     def destroy_node(self) -> None:
         """Close the page, and end."""
-        self._page.stop()
-        self._drawing.join()
+        self._page.close()
         self._server.stop()
         self._ears.destroy_node()
         super().destroy_node()

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from html import escape
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from tulip_ros import topics
 from tulip_strategy.interface import UserRequest
-from tulip_strategy.messages import tree_from_message, user_command_from_message
+from tulip_strategy.messages import tree_from_message
 from tulip_strategy.tree_drawing import SIGNS
 from tulip_strategy.tree_state import NodeStatus
 from tulip_view.columns import PHASES, SECONDARY, SET_PLAYS, name_of
@@ -39,9 +40,8 @@ def game(buffers: Buffers) -> str:
     lines = []
     message = buffers.newest(topics.USER_COMMAND)
     if message is not None:
-        command = user_command_from_message(message)
-        what = REQUESTS[command.request.value]
-        what += f" {command.strategy}" if command.request is UserRequest.PLAY else ""
+        what = name_of(REQUESTS, message.request)
+        what += f" {message.strategy}" if message.request == UserRequest.PLAY else ""
         lines.append(f"user: <b>{escape(what)}</b>")
     state = buffers.newest(topics.GAME_STATE)
     if state is not None:
@@ -92,7 +92,7 @@ def health(buffers: Buffers) -> str:
         if buffers.now - when > SILENT:
             words, colour = "silent", RED
         figures = {pair.key: pair.value for pair in status.values}
-        rates = {key.split()[1]: float(value) for key, value in figures.items() if key.startswith(RATE)}
+        rates = {key.split()[1]: _number(value) for key, value in figures.items() if key.startswith(RATE)}
         fastest = max(rates, key=lambda topic: rates[topic], default="")
         shown = [f"{rates[fastest]:.0f}/s {fastest}"] if fastest else []
         shown += [f"{key} {value}" for key, value in figures.items() if key.startswith(FIGURES)]
@@ -103,3 +103,11 @@ def health(buffers: Buffers) -> str:
             f"<td>{escape(', '.join(shown))}{says}</td></tr>"
         )
     return f'<table style="border-spacing:0.5em 0.1em">{"".join(rows)}</table>'
+
+
+def _number(words: str) -> float:
+    """Return a number that somebody else wrote; NaN for one that is none."""
+    try:
+        return float(words)
+    except ValueError:
+        return math.nan
