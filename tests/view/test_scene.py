@@ -276,6 +276,7 @@ def test_time_that_begins_anew_forgets_what_was_before_and_drops_what_comes_late
     take(intake, topics.ODOMETRY, 20, decoded)
     assert scene.stamp == pytest.approx(0.02)
     take(intake, topics.MOTION_STATE, 60_020, decoded)
+    take(intake, topics.DECISION, 60_020, decoded)  # tells no time: it may have waited since before
     assert scene.stamp == pytest.approx(0.02) and scene.balance() is None
 
 

@@ -11,6 +11,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from tulip_ros import topics
 from tulip_ros.time import NANOSECONDS, stamp_of
 from tulip_view.live.inputs import INPUTS
+from tulip_view.recording import STEADY
 
 
 class Buffers:
@@ -43,7 +44,7 @@ class Buffers:
                 self.health[status.name] = (arrival, status)
         entry = INPUTS[name]
         stamp = stamp_of(message) / NANOSECONDS
-        if not entry.topic.quality.latched:  # what is latched may be old
+        if name in STEADY:  # others may be of long ago, or of before time began anew
             self.stamp = max(self.stamp, stamp)
         self._newest[name] = message
         if entry.kept:

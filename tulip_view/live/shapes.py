@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+import trimesh
 import viser
 from numpy.typing import NDArray
 
@@ -19,6 +21,9 @@ FACES = np.array(
      (1, 5, 7), (1, 7, 3)], dtype=np.uint32,
 )  # fmt: skip
 """Of a cube, seen from outside."""
+AWAY = (0.0, 0.0, -50.0)
+"""[m] Where those of a batch wait that are not there."""
+UNTURNED = (1.0, 0.0, 0.0, 0.0)
 
 
 def colour(words: str) -> Colour:
@@ -49,36 +54,58 @@ def show(handle: viser.SceneNodeHandle | viser.GuiImageHandle, shown: bool) -> N
         handle.visible = shown
 
 
-class Boxes:
-    """Boxes fixed to moving frames, drawn as one mesh: a browser without a graphics card draws that fast."""
+class Solid(NamedTuple):
+    """One solid of a batch.
+
+    Attributes:
+        frame: Index of the frame that it is fixed to.
+        size: Edges or diameters [m].
+        centre: In the frame [m].
+        rgb: Its colour.
+    """
+
+    frame: int
+    size: Sequence[float]
+    centre: Sequence[float]
+    rgb: Colour
+
+
+class Batch:
+    """Boxes or balls fixed to moving frames, drawn as one mesh: a browser without a graphics card draws that fast.
+
+    What moves together must not be of different kinds for the browser: it would move one kind a picture later.
+    """
 
     def __init__(
         self,
         server: viser.ViserServer,
         name: str,
-        boxes: Sequence[tuple[int, Sequence[float], Sequence[float], Colour]],
+        solids: Sequence[Solid],
         opacity: float | None = None,
+        round_: bool = False,
     ) -> None:
         """Add them; they are hidden until `place`.
 
         Args:
             server: Of the page.
             name: In the scene, as in /robot.
-            boxes: Of each the index of its frame, size [m], centre in the frame [m], and RGB.
+            solids: What there is.
             opacity: 0 to 1; None for solid ones.
+            round_: Balls instead of boxes.
         """
-        self._frames = np.array([frame for frame, *_ in boxes])
-        self._centres = np.array([centre for _, _, centre, _ in boxes], dtype=float)
+        self._frames = np.array([solid.frame for solid in solids])
+        self._centres = np.array([solid.centre for solid in solids], dtype=float)
+        vertices, faces = _ball() if round_ else (CORNERS, FACES)
         self._handle = server.scene.add_batched_meshes_simple(
             name,
-            CORNERS,
-            FACES,
-            np.tile((1.0, 0.0, 0.0, 0.0), (len(boxes), 1)),
-            np.zeros((len(boxes), 3)),
-            batched_scales=np.array([size for _, size, _, _ in boxes], dtype=np.float32),
-            batched_colors=np.array([rgb for *_, rgb in boxes], dtype=np.uint8),
+            vertices,
+            faces,
+            np.tile((1.0, 0.0, 0.0, 0.0), (len(solids), 1)),
+            np.zeros((len(solids), 3)),
+            batched_scales=np.array([solid.size for solid in solids], dtype=np.float32),
+            batched_colors=np.array([solid.rgb for solid in solids], dtype=np.uint8),
             opacity=opacity,
-            flat_shading=True,
+            flat_shading=not round_,
             lod="off",
             cast_shadow=False,
             receive_shadow=False,
@@ -89,12 +116,26 @@ class Boxes:
         """Put them where their frames are.
 
         Args:
-            frames: (n, 7) position [m] and quaternion x, y, z, w of each frame; None hides the boxes.
+            frames: (n, 7) position [m] and quaternion x, y, z, w of each frame, NaN for one that is not there; None
+                hides them all.
         """
-        show(self._handle, frames is not None)
-        if frames is None:
+        known = frames is not None and bool(np.isfinite(frames).all(axis=1).any())
+        show(self._handle, known)
+        if frames is None or not known:
             return
         rotations = np.array([quaternion_matrix(frame[3:].tolist()) for frame in frames])[self._frames]
         positions = frames[self._frames, :3] + np.einsum("nij,nj->ni", rotations, self._centres)
-        self._handle.batched_positions = positions.astype(np.float32)
-        self._handle.batched_wxyzs = frames[self._frames][:, [6, 3, 4, 5]].astype(np.float32)
+        there = np.isfinite(positions).all(axis=1, keepdims=True)
+        self._handle.batched_positions = np.where(there, positions, AWAY).astype(np.float32)
+        self._handle.batched_wxyzs = np.where(there, frames[self._frames][:, [6, 3, 4, 5]], UNTURNED).astype(np.float32)
+
+
+def at(*points: Array) -> NDArray[np.float32]:
+    """Return (n, 7) frames at points (3,), parallel to the map's."""
+    return np.array([(*point, 0.0, 0.0, 0.0, 1.0) for point in points], dtype=np.float32)
+
+
+def _ball() -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """Return vertices and faces of a ball of diameter one."""
+    mesh = trimesh.creation.icosphere(subdivisions=2, radius=0.5)
+    return mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32)

@@ -15,10 +15,11 @@ from tulip_view.body_pose import COLOURS, OTHER_TEAM
 from tulip_view.ellipse import TURN
 from tulip_view.live.balance_picture import COLOURS as POINTS
 from tulip_view.live.scene import Balance, Scene
-from tulip_view.live.shapes import Array, Boxes, colour, segments, show
+from tulip_view.live.shapes import Array, Batch, Solid, at, colour, segments, show
 from tulip_view.report.field_paths import ground_lines
 from tulip_view.report.figures import BLUE, ORANGE, PURPLE, RED, SKY
 
+MIDDLE = (0.0, 0.0, 0.0)
 GHOST = (150, 150, 150)
 GHOST_OPACITY = 0.35
 POLES = {"yellow": (230, 199, 0), "blue": (30, 80, 190)}
@@ -41,23 +42,23 @@ class Stage:
             field: The field.
         """
         self._server, self._scene = server, scene
-        server.scene.configure_environment_map(None)  # a browser without a graphics card draws three times as fast
+        server.scene.configure_environment_map(None)  # for browsers without a graphics card, as all without shadows
         server.scene.configure_default_lights(True, cast_shadow=False)
         server.scene.add_light_ambient("/light", intensity=1.2)
         _add_field(server, field)
-        boxes = [(index, box.size, box.centre, colour(COLOURS[box.colour])) for index, box in scene.body.boxes]
-        self._robot = Boxes(server, "/robot", boxes)
-        self._ghost = Boxes(server, "/truth/robot", [(*box[:3], GHOST) for box in boxes], GHOST_OPACITY)
-        figure = [(0, part.size, part.centre, colour(COLOURS[part.colour])) for part in keeper_parts(OTHER_TEAM)]
-        self._others = [Boxes(server, f"/truth/figure{number}", figure, 0.6) for number in range(OTHERS)]
-        radius = field.ball_radius
-        self._ball_height = radius
-        self._ball = server.scene.add_icosphere("/ball", radius, colour(RED), subdivisions=2, cast_shadow=False)
-        self._true_ball = server.scene.add_icosphere(
-            "/truth/ball", radius, colour(ORANGE), subdivisions=2, opacity=0.5, cast_shadow=False
-        )
+        boxes = [Solid(index, box.size, box.centre, colour(COLOURS[box.colour])) for index, box in scene.body.boxes]
+        self._robot = Batch(server, "/robot", boxes)
+        self._ghost = Batch(server, "/truth/robot", [box._replace(rgb=GHOST) for box in boxes], GHOST_OPACITY)
+        figure = [Solid(0, part.size, part.centre, colour(COLOURS[part.colour])) for part in keeper_parts(OTHER_TEAM)]
+        self._others = [Batch(server, f"/truth/figure{number}", figure, 0.6) for number in range(OTHERS)]
+        size = 3 * (2.0 * field.ball_radius,)
+        self._ball_height = field.ball_radius
+        self._ball = Batch(server, "/ball", [Solid(0, size, MIDDLE, colour(RED))], round_=True)
+        self._true_ball = Batch(server, "/truth/ball", [Solid(0, size, MIDDLE, colour(ORANGE))], 0.5, round_=True)
+        heads = [Solid(index, 3 * (0.03,), MIDDLE, rgb) for index, rgb in enumerate(POINTS.values())]
+        self._heads = Batch(server, "/pins", heads, round_=True)
         self._lines = {
-            name: _Lines(server, f"/{name}", rgb, width)
+            name: _Lines(server, f"/lines/{name}".replace(" ", "_"), rgb, width)
             for name, rgb, width in (
                 ("place", colour(BLUE), 0.02),
                 ("robot_spread", colour(BLUE), 0.015),
@@ -65,17 +66,9 @@ class Stage:
                 ("opponents", colour(SKY), 0.03),
                 ("soles", (250, 250, 250), 0.006),
                 ("footsteps", colour(PURPLE), 0.012),
-                *((name.replace(" ", "_"), rgb, 0.008) for name, rgb in POINTS.items()),
+                *((name, rgb, 0.008) for name, rgb in POINTS.items()),
             )
         }
-        self._pins = {
-            name: server.scene.add_icosphere(
-                f"/{name.replace(' ', '_')}/head", 0.015, rgb, subdivisions=1, cast_shadow=False
-            )
-            for name, rgb in POINTS.items()
-        }
-        for handle in (*self._pins.values(), self._ball, self._true_ball):
-            show(handle, False)
 
     def draw(self, ghost: bool = True) -> None:
         """Draw what there is to see now.
@@ -98,12 +91,9 @@ class Stage:
         lines["ball_spread"].draw([around.ball_spread] if around.ball_spread is not None else [])
         ring = RING * np.column_stack([np.cos(TURN), np.sin(TURN)])
         lines["opponents"].draw([place + ring for place in around.opponents])
-        show(self._ball, around.ball is not None)
-        if around.ball is not None:
-            self._ball.position = (float(around.ball[0]), float(around.ball[1]), self._ball_height)
-        show(self._true_ball, ghost and around.true_ball is not None)
-        if around.true_ball is not None:
-            self._true_ball.position = around.true_ball
+        ball, true_ball = around.ball, around.true_ball if ghost else None
+        self._ball.place(at(np.append(ball, self._ball_height)) if ball is not None else None)
+        self._true_ball.place(at(true_ball) if true_ball is not None else None)
         for number, boxes in enumerate(self._others):
             there = ghost and number < len(around.true_others)
             boxes.place(_upright(around.true_others[number]) if there else None)
@@ -112,25 +102,19 @@ class Stage:
         lift = np.array((0.0, 0.0, ABOVE))
         self._lines["footsteps"].draw([corners + lift for corners in self._scene.footsteps()])
         self._lines["soles"].draw([] if balance is None else list(balance.soles + lift))
-        points: dict[str, Array] = {}
+        points = {name: np.full(3, np.nan) for name in POINTS}
         if balance is not None:
-            points = {
+            ground = {
                 "CoM": balance.com[:2],
                 "DCM": balance.dcm,
                 "ZMP": balance.zmp,
                 "ZMP wanted": balance.zmp_desired,
             }
-        for name, head in self._pins.items():
-            point = points.get(name)
-            line = self._lines[name.replace(" ", "_")]
-            if point is None or not np.isfinite(point).all():
-                show(head, False)
-                line.draw([])
-                continue
-            show(head, True)
-            x, y = point.tolist()
-            head.position = (x, y, PIN)
-            line.draw([np.array([(x, y, 0.0), (x, y, PIN)])], closed=False)
+            points = {name: np.append(ground[name], PIN) for name in POINTS}
+        self._heads.place(at(*points.values()))
+        for name, head in points.items():
+            foot = head * (1.0, 1.0, 0.0)
+            self._lines[name].draw([np.array([foot, head])], closed=False)
 
 
 class _Lines:
