@@ -5,7 +5,9 @@ from __future__ import annotations
 import _environment
 
 if __name__ == "__main__":
-    _environment.prepare()
+    import sys
+
+    _environment.prepare(("view",) if "--view" in sys.argv else ())
 
 import signal
 import sys
@@ -24,6 +26,7 @@ from tulip_ros.monitor import Monitor
 from tulip_ros.nodes import ROBOT
 from tulip_ros.run import ComponentNode, session
 from tulip_ros.transport import NAMES as TRANSPORTS
+from tulip_view.live.beside import PORT, address, page_beside
 
 LOOK = 0.2  # [s] between two looks at the processes
 
@@ -39,6 +42,8 @@ def main(
     record: Annotated[Path | None, typer.Option(help="Record all topics into this new folder.")] = None,
     transport: Annotated[str, typer.Option(help="auto, shared_memory or udp")] = "auto",
     logs: Annotated[Path | None, typer.Option(help="Folder for one log file a node.")] = None,
+    view: Annotated[bool, typer.Option("--view", help="Open a page to watch and steer in a browser.")] = False,
+    view_port: Annotated[int, typer.Option(help="TCP port of that page.", min=1, max=65535)] = PORT,
 ) -> None:
     """Start nodes and keep them running."""
     try:
@@ -52,6 +57,9 @@ def main(
             with Log(log):  # says what is wrong with it before anything starts
                 values["driver"] = {"file": str(log.absolute())}
         starts = plan.make_plan(names, None if driver == "none" else driver, namespace, parameters or (), values)
+        if view:
+            starts += page_beside(view_port, plan.check_namespace(namespace))
+            print(f"watch it at {address(view_port)}", file=sys.stderr)
         keep_running(Launcher(starts, logs, transport), namespace)
     except BadInputError as error:
         print(f"error: {error}", file=sys.stderr)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import _environment
 
 if __name__ == "__main__":
-    _environment.prepare()
+    import sys
+
+    _environment.prepare(("view",) if "--view" in sys.argv else ())
 
 import json
 import os
@@ -22,12 +24,13 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
 from tulip_ros.picture_rate import PICTURE_RATE, PictureRate
+from tulip_ros.plan import Start
 from tulip_ros.recorder_node import PICTURES
 from tulip_sim.lockstep import Settings
 from tulip_sim.lockstep_recording import KINDS, RecordedPictures
 from tulip_sim.match_graph import play_graph
 from tulip_sim.match_lockstep import play_lockstep
-from tulip_sim.match_rules import MatchRules
+from tulip_sim.match_rules import NAMESPACES, MatchRules
 from tulip_sim.match_settings import MatchSettings
 from tulip_sim.match_summary import MatchSummary
 from tulip_sim.match_two_graph import match_plan, play_match_graph
@@ -38,6 +41,7 @@ from tulip_sim.scenario import SCENARIOS
 from tulip_sim.trial import TrialSummary
 from tulip_strategy.behaviour.tree import STRATEGIES
 from tulip_strategy.game_controller import REFEREE_PORT
+from tulip_view.live.beside import PORT, address, page_beside
 
 MODES = ("graph", "lockstep")
 EYES = {"camera": None, "degraded": PerceptionParameters(), "ideal": PerceptionParameters.ideal()}
@@ -77,6 +81,8 @@ def main(
     playing_time: Annotated[float, typer.Option(help="Seconds of each trial of a match.")] = MatchRules.playing_time,
     striker: Annotated[str, typer.Option(help="Strategy of the robot; of a match's striker.")] = MatchSettings.striker,
     keeper: Annotated[str, typer.Option(help="Strategy of a match's goalkeeper.")] = MatchSettings.keeper,
+    view: Annotated[bool, typer.Option("--view", help="Open a page to watch and steer in a browser (graph).")] = False,
+    view_port: Annotated[int, typer.Option(help="TCP port of that page.", min=1, max=65535)] = PORT,
 ) -> None:
     """Play one trial, or a match of two robots.
 
@@ -94,8 +100,8 @@ def main(
                 raise BadInputError(f"{option} is {name!r}; expected one of {', '.join(STRATEGIES)}.")
         if eyes not in EYES:
             raise BadInputError(f"--eyes is {eyes!r}; expected one of {', '.join(EYES)}.")
-        if mode != "graph" and (parameters or logs):
-            raise BadInputError("--parameters and --logs are for nodes; expected --mode graph with them.")
+        if mode != "graph" and (parameters or logs or view):
+            raise BadInputError("--parameters, --logs and --view are for nodes; expected --mode graph with them.")
         kinds = tuple(PICTURES) if mode == "graph" else KINDS
         if pictures not in kinds:
             raise BadInputError(f"--pictures is {pictures!r}; expected one of {', '.join(kinds)} in mode {mode}.")
@@ -108,9 +114,14 @@ def main(
                 raise BadInputError("--eyes is for one robot, or for --mode lockstep; expected camera with two.")
         if json_path is not None:
             check_writable(json_path, "--json")
+        page = page_beside(view_port, NAMESPACES[0] if teams == 2 else "") if view else ()
+        if view:
+            console.print(f"watch it at {address(view_port)}", highlight=False)
         folder = None if no_record else record or default_folder(seed, mode if teams == 1 else f"match_{mode}")
         if teams == 2:
-            result = play_match(seed, mode, match, folder, recorded, parameters or (), own, referee_port, logs, console)
+            result = play_match(
+                seed, mode, match, folder, recorded, parameters or (), own, referee_port, logs, console, page
+            )
             report(result.report.verdict, result, console)
             if json_path is not None:
                 json_path.write_text(json.dumps(result.as_dict(), indent=2) + "\n")
@@ -141,6 +152,7 @@ def main(
                     logs=logs,
                     perception=EYES[eyes],
                     strategy=striker,
+                    beside=page,
                 )
             else:
                 beside = (os.cpu_count() or 1) > 1 and EYES[eyes] is None
@@ -192,6 +204,7 @@ def play_match(
     referee_port: int,
     logs: Path | None,
     console: Console,
+    page: Sequence[Start],
 ) -> MatchSummary:
     """Play a match of two robots and print the referee's log as it grows."""
     rules = settings.rules
@@ -209,7 +222,7 @@ def play_match(
         if mode == "graph":
             ports = (referee_port, referee_port + 2)
             plan = match_plan(seed, rules, folder, parameters, values, ports, settings.striker, settings.keeper)
-            return play_match_graph(plan, seed, folder, show, say, logs)
+            return play_match_graph((*plan, *page), seed, folder, show, say, logs)
         beside = (os.cpu_count() or 1) > 1 and all(robot.perception is None for robot in settings.robots)
         return play_lockstep_match(seed, settings, folder, show, say, eyes_beside=beside, recorded=recorded)
 

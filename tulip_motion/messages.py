@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 
 import numpy as np
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, TransformStamped
 from nav_msgs.msg import Odometry as OdometryMessage
 from numpy.typing import NDArray
 from sensor_msgs.msg import Imu, JointState
@@ -19,6 +20,7 @@ from tulip_description.robot import JOINTS
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_description.short_numbers import fixed_point
 from tulip_motion.identification.progress import Progress
+from tulip_motion.footsteps import Footstep
 from tulip_motion.interface import (
     HeadCommand,
     HeadMode,
@@ -232,6 +234,16 @@ _STATE_ARRAYS = {
     **dict.fromkeys(("torque_feedback", "torque_feedforward", "torque_learned"), COARSE),
 }
 """How many binary digits of each go into a message."""
+
+
+def footsteps_to_message(footsteps: Sequence[Footstep], stamp: int) -> PoseArray:
+    """Return planned footsteps at a stamp [ns] as a message: the soles in odom, in the order of time."""
+    message = PoseArray(header=header(stamp, frames.ODOM))
+    for _, pose in footsteps:
+        position = Point(x=pose.x, y=pose.y)
+        turn = Quaternion(z=math.sin(pose.yaw / 2.0), w=math.cos(pose.yaw / 2.0))
+        message.poses.append(Pose(position=position, orientation=turn))
+    return message
 
 
 def motion_state_to_message(state: MotionState, distance: float) -> MotionStateMessage:

@@ -129,6 +129,11 @@ class Motion:
         gait = self._gait.notes if isinstance(self._gait, Walking | PaperGait) else ()
         return (*gait, *self._tracking.notes)
 
+    @property
+    def footsteps(self) -> tuple[Footstep, ...]:
+        """The next footsteps of the default gait, in odom; none while the robot stands, kicks or lies."""
+        return self._gait.footsteps if isinstance(self._gait, Walking) else ()
+
     def start_kick(self, goal: KickGoal) -> str:
         """Begin a kick; return "" or the reason why not."""
         if self._kick is not None and not self._kick.finished:

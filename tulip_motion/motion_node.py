@@ -10,9 +10,11 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.task import Future
 
 from tulip_description.robot import load_robot
+from tulip_motion.footsteps import Footstep
 from tulip_motion.interface import KickGoal, KickKind, MotionMode, Side, WalkCommand, WalkMode
 from tulip_motion.messages import (
     body_transforms,
+    footsteps_to_message,
     joint_command_to_message,
     motion_state_to_message,
     odometry_to_message,
@@ -54,6 +56,7 @@ class MotionNode(ComponentNode):
         self._legs = self.sender(topics.LEG_COMMAND)
         self._odometry = self.sender(topics.ODOMETRY)
         self._state = self.sender(topics.MOTION_STATE)
+        self._footsteps = self.sender(topics.FOOTSTEPS)
         self._tf = self.sender(topics.TF)
         self.listen(topics.JOINT_STATES, lambda message: self._on_sensor("joint_states", message))
         self.listen(topics.IMU, lambda message: self._on_sensor("imu", message))
@@ -78,6 +81,7 @@ class MotionNode(ComponentNode):
     def _begin(self) -> None:
         """Make the core, and forget sensors and commands of before."""
         self._notes: set[str] = set()  # kinds of notes in the last report
+        self._footsteps_told: tuple[Footstep, ...] | None = None
         self._motion = Motion(self._settings, load_robot())
         self._sensors = SameStamp("joint_states", "imu", "foot_forces")
         self._tick = 0
@@ -113,6 +117,10 @@ class MotionNode(ComponentNode):
         self._odometry.publish(odometry_to_message(odometry))
         self._tf.publish(body_transforms(odometry))
         self._state.publish(motion_state_to_message(state, odometry.distance))
+        footsteps = self._motion.footsteps
+        if footsteps != self._footsteps_told:
+            self._footsteps_told = footsteps
+            self._footsteps.publish(footsteps_to_message(footsteps, state.stamp))
         notes = {note.partition(":")[0]: note for note in state.notes}
         for kind in notes.keys() - self._notes:
             self.health.count(kind, notes[kind])  # "walk command clipped", once for as long as it lasts

@@ -63,6 +63,13 @@ class Walking:
         """What was taken off the command, in words."""
         return (self.course.note,) if self.course.note else ()
 
+    @property
+    def footsteps(self) -> tuple[Footstep, ...]:
+        """The next footsteps: the one under way, where it is to land now, and those planned after it."""
+        if self._stance is None or self._swing_over:
+            return ()
+        return (Footstep(self._stance.side.other, self._target), *self._following)
+
     def kick_next(self, kick: WalkingKick) -> str:
         """Take a kick for one of the steps after the present one; return "" or the reason why not."""
         if self._stance is None or self._swing_over:
@@ -142,6 +149,7 @@ class Walking:
             steps = self.kick.adapt(stance, trailing, steps, self.course.velocity, not isinstance(wish, tuple))
             step_time = self.kick.step_time or step_time
         self._target = self._nominal = steps[0].pose
+        self._following = tuple(steps[1:])
         swing_time = step_time - p.double_support_time
         self._landing_time = self._planned_landing_time = shift_time + swing_time
         self._aim = aim

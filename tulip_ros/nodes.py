@@ -53,6 +53,7 @@ NODES: dict[str, NodeEntry] = {
         NodeEntry("identify", "tulip_motion.identification.identify_node", playing=False),
         NodeEntry("recorder", "tulip_ros.recorder_node", playing=False),
         NodeEntry("replay", "tulip_ros.replay_node", playing=False),
+        NodeEntry("view", "tulip_view.live.view_node", playing=False),
     )
 }
 """All nodes but the driver, by name."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -184,6 +184,14 @@ ODOMETRY = Topic(
 MOTION_STATE = Topic(
     "motion_state", MotionState, CONTROL, ("motion",), ("strategy", "game_input"), "everything about the legs"
 )
+FOOTSTEPS = Topic(
+    "footsteps",
+    PoseArray,
+    STATE,
+    ("motion",),
+    (),
+    "the walk's next footsteps, whenever they change: soles in odom, the one under way first; none while it stands",
+)
 WORLD_STATE = Topic(
     "world_state", WorldState, STATE, ("worldmodel",), ("strategy", "game_input"), "robot, ball and opponents"
 )
@@ -248,6 +256,7 @@ TOPICS: tuple[Topic, ...] = (
     VISION_PICTURE,
     ODOMETRY,
     MOTION_STATE,
+    FOOTSTEPS,
     WORLD_STATE,
     ROBOT_POSE,
     TF,

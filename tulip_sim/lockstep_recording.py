@@ -14,6 +14,7 @@ from rclpy.serialization import serialize_message
 from tulip_description.robot import load_robot
 from tulip_motion.messages import (
     body_transforms,
+    footsteps_to_message,
     head_command_to_message,
     joint_command_to_message,
     motion_state_to_message,
@@ -100,6 +101,7 @@ class LockstepRecording:
                 (topics.TF, body_transforms(value)),
             ],
             "motion_state": lambda stamp, value: [(topics.MOTION_STATE, motion_state_to_message(*value))],
+            "footsteps": lambda stamp, value: [(topics.FOOTSTEPS, footsteps_to_message(*value))],
             "world_state": lambda stamp, value: [
                 (topics.WORLD_STATE, world_state_to_message(value)),
                 (topics.ROBOT_POSE, robot_pose_to_message(value)),

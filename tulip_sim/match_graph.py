@@ -154,6 +154,7 @@ def play_graph(
     logs: Path | None = None,
     perception: PerceptionParameters | None = None,
     strategy: str = "dribble_and_kick",
+    beside: Sequence[Start] = (),
 ) -> TrialSummary:
     """Play one trial.
 
@@ -169,13 +170,14 @@ def play_graph(
         logs: Folder for one log file a node.
         perception: How good node perception is, which then stands in for vision; None for camera and vision.
         strategy: Name of what the robot plays.
+        beside: Further nodes to run, as a view.
 
     Raises:
         BadInputError: if a node refuses what it was given, or the simulator falls silent.
     """
     plan = trial_plan(seed, scenario, record, parameter_files, values, referee_port, perception, strategy)
     with (
-        Launcher(plan, logs) as launcher,
+        Launcher((*plan, *beside), logs) as launcher,
         session(TrialWatcher, arguments=[], handle_signals=False) as (watcher, spin),
     ):
         end: float | None = None

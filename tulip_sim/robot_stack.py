@@ -21,6 +21,7 @@ from tulip_description.field import Field
 from tulip_description.planar import Pose2D
 from tulip_description.quaternion import pose_on_ground
 from tulip_description.robot_io import JointCommand
+from tulip_motion.footsteps import Footstep
 from tulip_motion.head import HeadMovement, HeadParameters
 from tulip_motion.interface import HeadCommand, HeadMode, MotionState
 from tulip_motion.motion import Motion
@@ -106,6 +107,7 @@ class RobotStack:
         self._poses = PoseBuffer(PoseBufferParameters(), partial(camera_in_footprint, body, mount=load_mount()))
         self.world_model = WorldModel(settings.worldmodel, self._field, start)
         self.motion = Motion(settings.motion, body)
+        self._footsteps_told: tuple[Footstep, ...] | None = None
         self.head = HeadMovement(settings.head, body)
         self.strategy = Strategy(settings.strategy, self._field)
         self.game_input = GameInput(settings.game_input)
@@ -181,7 +183,11 @@ class RobotStack:
         self._pending.append(command)
         now = self.world.stamp
         self._tell("odometry", now, odometry)
-        self._tell("motion_state", now, (self.motion.state(), odometry.distance))
+        state, footsteps = self.motion.state(), self.motion.footsteps
+        self._tell("motion_state", now, (state, odometry.distance))
+        if footsteps != self._footsteps_told:
+            self._footsteps_told = footsteps
+            self._tell("footsteps", now, (footsteps, state.stamp))
         self._tell("head/joint_command", now, command)
         self._tell_truth(now)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -181,7 +181,7 @@ def read(log: Log, robot: str, wanted: Mapping[str, Wanted], advance: Advance = 
     Raises:
         BadInputError: if the recording is damaged, or a message does not fit its type.
     """
-    names, remarks = _full_names(log, robot, wanted)
+    names, remarks = full_names(log, robot, wanted)
     kinds = {topic.name: topic.message for topic in topics.TOPICS}
     lacking: dict[str, set[str]] = {name: set() for name in names.values()}
     runs: list[dict[str, list[tuple[int | None, int, Any]]]] = [{}]
@@ -224,11 +224,17 @@ def message_at(log: Log, recording: Recording, topic: topics.Topic, index: int) 
 
 def expected_messages(log: Log, robot: str, wanted: Mapping[str, Wanted]) -> int:
     """Return how many messages `read` will look at."""
-    return sum(log.topics[name].messages for name in _full_names(log, robot, wanted)[0])
+    return sum(log.topics[name].messages for name in full_names(log, robot, wanted)[0])
 
 
-def _full_names(log: Log, robot: str, wanted: Mapping[str, Wanted]) -> tuple[dict[str, str], list[str]]:
-    """Return the names that the recording has of what is wanted, and the clock, by their full names; and remarks."""
+def full_names(log: Log, robot: str, wanted: Collection[str]) -> tuple[dict[str, str], list[str]]:
+    """Return the names that the recording has of what is wanted, and the clock, by their full names; and remarks.
+
+    Args:
+        log: The recording.
+        robot: Namespace of the robot.
+        wanted: Names within the namespace.
+    """
     names, remarks = {}, []
     types = {topic.name: topic.type_name for topic in topics.TOPICS}
     for name in (*wanted, CLOCK):

@@ -11,15 +11,19 @@ from rclpy.serialization import deserialize_message, serialize_message
 from scipy.spatial.transform import Rotation
 
 from tulip_description import frames
+from tulip_description.planar import Pose2D
+from tulip_description.quaternion import pose_on_ground
 from tulip_description.robot import JOINTS, LEG_JOINTS, load_robot
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_description.short_numbers import fixed_point
+from tulip_motion.footsteps import Footstep
 from tulip_motion.interface import (
     HeadCommand,
     HeadMode,
     MotionMode,
     MotionState,
     Odometry,
+    Side,
     Support,
     WalkCommand,
     WalkMode,
@@ -27,6 +31,7 @@ from tulip_motion.interface import (
 from tulip_motion.messages import (
     COARSE,
     body_transforms,
+    footsteps_to_message,
     head_command_from_message,
     head_command_to_message,
     joint_command_from_message,
@@ -177,6 +182,17 @@ def test_motion_state_survives_with_its_distance(rng: np.random.Generator) -> No
     message = _sent(motion_state_to_message(state, 3.5))
     assert message.distance == 3.5
     _assert_equal(motion_state_from_message(message), state)
+
+
+def test_footsteps_are_told_in_their_order_with_their_headings() -> None:
+    steps = [Footstep(Side.LEFT, Pose2D(1.0, -2.0, 0.5)), Footstep(Side.RIGHT, Pose2D(1.2, -2.2, -3.0))]
+    message = _sent(footsteps_to_message(steps, STAMP))
+    assert message.header.frame_id == frames.ODOM
+    for step, pose in zip(steps, message.poses, strict=True):
+        turn = pose.orientation
+        told = pose_on_ground((pose.position.x, pose.position.y), (turn.x, turn.y, turn.z, turn.w))
+        assert told.as_array() == pytest.approx(step.pose.as_array(), abs=1e-12)
+    assert not footsteps_to_message((), STAMP).poses
 
 
 def test_unknown_modes_are_refused() -> None:

@@ -123,3 +123,22 @@ def test_heading_is_held_while_walking_fast() -> None:
     _, _, z, w = run.world.truth().base_orientation
     assert abs(2.0 * np.arctan2(z, w)) < 0.05  # the IMU's own drift is up to 0.01 rad in this time
     assert abs(run.world.truth().base_position[1]) < 0.3
+
+
+def test_feet_land_where_the_footsteps_were_announced() -> None:
+    run = Run()
+    run.go(0.3)
+    assert run.motion.footsteps == ()
+    landings = []
+    for _ in range(round(5.0 / TICK)):
+        before = run.motion.footsteps
+        run.go(TICK, walk(0.3, 0.0, 0.2))
+        after = run.motion.footsteps
+        if before and after and before[0].side is not after[0].side:  # a foot has landed, the other one swings next
+            sole = run.motion.state().soles[before[0].side][:2, 3]
+            landings.append(np.hypot(*(sole - (before[0].pose.x, before[0].pose.y))))
+            assert after[0].side is before[1].side
+    assert len(landings) > 6
+    assert max(landings) < 0.04  # [m] of tracking in the swing
+    run.go(4.0)
+    assert run.motion.footsteps == ()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,29 +9,16 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from _environment import BROWSERS
+from browser import MARKS, PATIENCE, pictures_folder, started
 from recordings_to_view import play
 
 from tulip_ros.log_file import Log
 from tulip_view.report.build import make_report
 from tulip_view.report.page import make_page
 
-sync_api = pytest.importorskip(
-    "playwright.sync_api",
-    reason="playwright is not installed: pip install -e '.[browser]' (browsers are not downloaded)",
-)
-
-CHROMIUM = next((found for name in BROWSERS if (found := shutil.which(name))), None)
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.sim,
-    pytest.mark.skipif(CHROMIUM is None, reason=f"no browser on the PATH; expected one of {', '.join(BROWSERS)}"),
-]
+pytestmark = [*MARKS, pytest.mark.sim]
 
 SECTIONS = ["happened", "replay", "fieldpaths", "errors", "stills", "balance", "joints", "timing", "about"]
-SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
-"""WebGL without a graphics card."""
-PATIENCE = 240_000  # [ms] for a machine that is busy with other things
 
 
 @pytest.fixture(scope="module")
@@ -46,21 +31,13 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder of the screenshots: the one that TULIP_TEST_PICTURES names, to look at them afterwards."""
-    named = os.environ.get("TULIP_TEST_PICTURES")
-    folder = Path(named) if named else tmp_path_factory.mktemp("pictures")
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
+    return pictures_folder(tmp_path_factory.mktemp("pictures"))
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    # A browser that runs as root has no sandbox; the only page that it opens is our own.
-    sandbox = ("--no-sandbox",) if os.getuid() == 0 else ()
-    with sync_api.sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=CHROMIUM, args=[*SOFTWARE, *sandbox])
-        yield started
-        started.close()
+    with started() as running:
+        yield running
 
 
 class Opened:

@@ -1,0 +1,96 @@
+"""The page's left side while a robot runs: limp, start, stop, stand, tests, pushes, recordings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from html import escape
+
+import viser
+
+from tulip_strategy.behaviour.tree import STRATEGIES
+from tulip_strategy.interface import UserRequest
+from tulip_strategy.menu import Wish
+from tulip_strategy.user_input import SIDES, UserInputParameters
+from tulip_view.live.info_panel import STYLE
+from tulip_view.live.user_calls import UserCalls
+
+WIDTH = 270  # [px]
+PUSHES = {"forward": 0.0, "to the left": 90.0, "backward": 180.0, "to the right": -90.0}
+"""Directions as the robot sees them [deg]."""
+LIMP = "LIMP (emergency stop)"
+LIMP_WISH = Wish(UserRequest.LIMP)
+AS_IT_IS = "as it is"
+
+
+class SteerPanel:
+    """Buttons that call the services of user input, recorder and simulator."""
+
+    def __init__(self, server: viser.ViserServer, calls: Callable[[], UserCalls], heading: Callable[[], float]) -> None:
+        """Add it.
+
+        Args:
+            server: Of the page.
+            calls: Returns what calls the services of the robot that is shown.
+            heading: Returns where the robot looks in the map [rad].
+        """
+        self._calls = calls
+        gui = server.gui
+        always = gui.add_panel()
+        with always.add_tab("Steer"):
+            self._on(gui.add_button(LIMP, color="red", hint="Legs without stiffness, at once. Key: L"), LIMP_WISH)
+            self._on(gui.add_button("Stop", hint="Stop and stand, whatever the referee says"), Wish(UserRequest.STOP))
+            self._on(gui.add_button("Stand", hint="Stand up straight"), Wish(UserRequest.STAND))
+            strategy = gui.add_dropdown("strategy", (AS_IT_IS, *STRATEGIES))
+            start = gui.add_button("Start", color="green", hint="Obey the referee and play")
+            self._answer = gui.add_html("")
+        always.dock_left()
+        always.set_width(WIDTH)
+        gui.add_command("Limp: legs without stiffness", hotkey="L").on_trigger(lambda _: calls().wish(LIMP_WISH))
+        tests = gui.add_panel()  # of its own: however long it is, the buttons above stay in sight
+        with tests.add_tab("Test"):
+            with gui.add_folder("Walk test", expand_by_default=False):
+                sliders = [
+                    gui.add_slider(name, -limit, limit, 0.05, 0.0)
+                    for name, limit in zip(
+                        ("forward [m/s]", "left [m/s]", "turn [rad/s]"),
+                        UserInputParameters.walk_test_limits,
+                        strict=True,
+                    )
+                ]
+                walk = gui.add_button("Walk")
+            with gui.add_folder("Kick test", expand_by_default=False):
+                for side in SIDES:
+                    self._on(gui.add_button(f"Kick {side}"), Wish(UserRequest.KICK_TEST, argument=side))
+            with gui.add_folder("Simulator", expand_by_default=False):
+                direction = gui.add_dropdown("push", tuple(PUSHES))
+                strength = gui.add_slider("impulse [N s]", 1.0, 15.0, 0.5, 4.0)
+                push = gui.add_button("Push the trunk")
+            with gui.add_folder("Recording", expand_by_default=False):
+                begin, end = gui.add_button("Begin a recording"), gui.add_button("End the recording")
+        tests.dock_below(always)
+
+        @start.on_click
+        def _(event: object) -> None:
+            name = "" if strategy.value == AS_IT_IS else strategy.value
+            calls().wish(Wish(UserRequest.PLAY, strategy=name))
+
+        @walk.on_click
+        def _(event: object) -> None:
+            forward, left, turning = (float(slider.value) for slider in sliders)
+            calls().wish(Wish(UserRequest.WALK_TEST, velocity=(forward, left, turning)))
+
+        @push.on_click
+        def _(event: object) -> None:
+            angle = heading() + math.radians(PUSHES[direction.value])
+            calls().push((strength.value * math.cos(angle), strength.value * math.sin(angle), 0.0))
+
+        begin.on_click(lambda _: calls().record(True))
+        end.on_click(lambda _: calls().record(False))
+
+    def tell(self, words: str) -> None:
+        """Show what came of a wish."""
+        self._answer.content = STYLE.format(f"<b>{escape(words)}</b>")
+
+    def _on(self, button: viser.GuiButtonHandle, wish: Wish) -> None:
+        button.on_click(lambda _: self._calls().wish(wish))
