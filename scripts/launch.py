@@ -72,7 +72,7 @@ def keep_running(launcher: Launcher, namespace: str) -> None:
             ),
             Live(console=console, auto_refresh=False, transient=False) as live,
         ):
-            monitor = Monitor(node)
+            monitor = Monitor(node, [state.name for state in launcher.states()])
             while True:
                 spin(LOOK)
                 for line in launcher.poll():

@@ -50,18 +50,23 @@ NODES: dict[str, NodeEntry] = {
         NodeEntry("game_input", "tulip_strategy.game_input_node"),
         NodeEntry("user_input", "tulip_strategy.user_input_node"),
         NodeEntry("perception", "tulip_sim.perception_node", playing=False),
+        NodeEntry("aggregator", "tulip_ros.aggregator_node", playing=False),
+        NodeEntry("markers", "tulip_view.markers_node", playing=False),
         NodeEntry("recorder", "tulip_ros.recorder_node", playing=False),
         NodeEntry("replay", "tulip_ros.replay_node", playing=False),
     )
 }
 """All nodes but the driver, by name."""
 
+DRIVER = "driver"
+"""Name in the graph of whatever stands for the robot's body."""
+
 DRIVERS: dict[str, NodeEntry] = {
-    "sim": NodeEntry("driver", "tulip_sim.driver_node", playing=False),
-    "match": NodeEntry("driver", "tulip_sim.match_driver_node", playing=False),
-    "log": NodeEntry("driver", "tulip_sim.log_driver_node", playing=False),
+    "sim": NodeEntry(DRIVER, "tulip_sim.driver_node", playing=False),
+    "match": NodeEntry(DRIVER, "tulip_sim.match_driver_node", playing=False),
+    "log": NodeEntry(DRIVER, "tulip_sim.log_driver_node", playing=False),
 }
-"""What can stand for the robot's body, for the bodies of two, or for a recorded one: each is a node named "driver"."""
+"""What can stand for the robot's body, for the bodies of two, or for a recorded one: each is a node named DRIVER."""
 
 ROBOT: tuple[str, ...] = tuple(name for name, entry in NODES.items() if entry.playing)
 """The nodes that make the robot play, in the order of the data flow."""
