@@ -23,9 +23,9 @@ from tulip_ros import topics
 from tulip_ros.bag import Bag
 from tulip_ros.log_file import Log
 from tulip_ros.time import from_message
+from tulip_view.ellipse import ellipse
 from tulip_view.recording import Recording, message_at, read
 from tulip_view.report.build import WANTED, Report, make_report
-from tulip_view.report.field_paths import ellipse
 from tulip_view.report.figures import Band, Figure, ink_on
 from tulip_view.report.happened import _without_echoes, doing
 from tulip_view.report.page import draw, fitting, make_page, packed

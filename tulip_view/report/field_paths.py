@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from tulip_description.field import Field
-from tulip_description.planar import Pose2D
 from tulip_ros import topics
+from tulip_view.ellipse import LARGEST, SIGMAS, TURN, ball_ellipse, robot_ellipse
 from tulip_view.recording import Recording
 from tulip_view.report.figures import (
     BLACK,
@@ -28,15 +28,12 @@ from tulip_view.report.figures import (
 
 TITLE = "The field"
 ELLIPSE_PERIOD = 5.0  # [s] between two ellipses
-SIGMAS = 2.0
-TURN = np.linspace(0.0, 2.0 * math.pi, 33)
 WHITE = "#ffffff"
 TURF = "#4a8f4a"
 PALE_TURF = "#a9c9a4"
 """Of the diagram: dark lines can be told apart on it."""
 RING = 0.07  # [m] radius
 JUMP = 0.5  # [m] between two samples: somebody has set it down elsewhere, and no path leads there
-LARGEST_ELLIPSE = 3.0  # [m] of its half axis; more says no more than "anywhere", and covers the rest
 
 
 def field_paths(recording: Recording, field: Field) -> Section:
@@ -86,7 +83,7 @@ def field_paths(recording: Recording, field: Field) -> Section:
     if world is not None:
         words.append(
             f"Ellipses: {SIGMAS:g} sigma of the estimates, every {ELLIPSE_PERIOD:g} s; those larger than "
-            f"{LARGEST_ELLIPSE:g} m are left out, and good estimates have some that are smaller than the lines."
+            f"{LARGEST:g} m are left out, and good estimates have some that are smaller than the lines."
         )
     return Section("fieldpaths", TITLE, words, [figure])
 
@@ -132,21 +129,6 @@ def path(name: str, points: Array, colour: str, dashed: bool = False) -> Line:
     return Line(name, x, y, colour, dashed=dashed, width=2.0 if dashed else 3.5)
 
 
-def ellipse(centre: Array, covariance: Array) -> Array | None:
-    """Return (33, 2) points of the ellipse of SIGMAS standard deviations, or None for one that is too large to tell.
-
-    Args:
-        centre: (2,) [m].
-        covariance: (2, 2) [m^2].
-    """
-    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2.0)
-    radii = SIGMAS * np.sqrt(np.maximum(values, 0.0))
-    if not np.isfinite(radii).all() or radii.max() > LARGEST_ELLIPSE:
-        return None
-    points: Array = centre + (np.column_stack([np.cos(TURN), np.sin(TURN)]) * radii) @ vectors.T
-    return points
-
-
 def _ellipses(times: Array, messages: list[Any]) -> list[Line]:
     robots: list[Array] = []
     balls: list[Array] = []
@@ -156,15 +138,10 @@ def _ellipses(times: Array, messages: list[Any]) -> list[Line]:
         if time < due:
             continue
         due = time + ELLIPSE_PERIOD
-        pose = np.asarray(message.robot_pose, dtype=float)
-        covariance = np.asarray(message.robot_covariance).reshape(3, 3)
-        found = ellipse(pose[:2], covariance[:2, :2])
+        found = robot_ellipse(message)
         robots += [found, gap] if found is not None else []
         if message.ball_known:
-            ball = message.ball
-            turn = Pose2D(0.0, 0.0, float(pose[2])).rotation()
-            spread = turn @ np.asarray(ball.covariance).reshape(4, 4)[:2, :2] @ turn.T
-            found = ellipse(np.asarray(ball.position_in_map, dtype=float), spread)
+            found = ball_ellipse(message)
             balls += [found, gap] if found is not None else []
     lines = []
     for name, pieces, colour in (("robot, 2 sigma", robots, BLUE), ("ball, 2 sigma", balls, RED)):

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from tulip_description.field import Field
 from tulip_description.keeper import keeper_parts
-from tulip_description.model import floating_model
 from tulip_description.robot import LEG_JOINTS, Robot
 from tulip_ros import topics
+from tulip_view.body_pose import COLOURS, OTHER_TEAM, BodyPose, pose_row, turned
 from tulip_view.columns import ANGLE, LAST, LINEAR, Alignment
 from tulip_view.recording import Recording, Track
 from tulip_view.report.field_paths import ground_lines
@@ -24,7 +23,6 @@ from tulip_view.tables import align
 TITLE = "Replay"
 RATE = 15.0  # [1/s]
 MOST_FRAMES = 3600  # longer recordings have fewer frames a second
-COLOURS = {"grey": "#9aa3ad", "black": "#33373d", "marker": "#17becf", "cyan": "#17becf", "magenta": "#d62ad6"}
 
 
 def replay(recording: Recording, robot: Robot, field: Field) -> Section:
@@ -56,9 +54,12 @@ def replay(recording: Recording, robot: Robot, field: Field) -> Section:
         angles = _angles(motion, list(LEG_JOINTS), motion.gather("joint_positions"), robot, times)
         words += " Its head looks straight ahead: the angles of the neck are not recorded."
     data: dict[str, Any] = {"times": times.astype(np.float32), "rate": rate}
-    names = [link.name for link in robot.links if link.boxes]
-    data["links"] = _link_poses(robot, names, base, angles)  # (frames, links, 7)
-    data["boxes"] = _boxes(robot, names)
+    body = BodyPose(robot)
+    data["links"] = np.stack([body.links(place, joints) for place, joints in zip(base, angles, strict=True)])
+    data["boxes"] = [
+        {"link": index, "size": box.size, "centre": box.centre, "colour": COLOURS[box.colour]}
+        for index, box in body.boxes
+    ]
     data["ground"] = [
         {"x": line.x, "y": line.y, "colour": line.colour, "fill": line.closed} for line in ground_lines(field)
     ]
@@ -83,7 +84,7 @@ def replay(recording: Recording, robot: Robot, field: Field) -> Section:
         data["other"] = _columns(truth, others, times, (LINEAR, LINEAR, ANGLE))
         data["other_boxes"] = [
             {"size": part.size, "centre": part.centre, "colour": COLOURS[part.colour]}
-            for part in keeper_parts("magenta")  # the own robot is drawn with cyan marks
+            for part in keeper_parts(OTHER_TEAM)
         ]
     if world is not None:
         poses = [tuple(m.robot_pose) for m in world.messages]
@@ -114,20 +115,7 @@ def _columns(
 
 def _poses(track: Track, poses: list[Any], times: Array) -> Array:
     """Return (n, 7): position and quaternion x, y, z, w at each time."""
-    rows = np.array(
-        [
-            (
-                p.position.x,
-                p.position.y,
-                p.position.z,
-                p.orientation.x,
-                p.orientation.y,
-                p.orientation.z,
-                p.orientation.w,
-            )
-            for p in poses
-        ]
-    )
+    rows = np.array([pose_row(pose) for pose in poses])
     for index in range(1, len(rows)):  # the same attitude has two quaternions: take the near one
         if rows[index, 3:] @ rows[index - 1, 3:] < 0.0:
             rows[index, 3:] *= -1.0
@@ -142,10 +130,7 @@ def _believed(world: Track, odometry: Track, times: Array) -> Array:
     pose = world.gather("robot_pose")
     in_odom = world.gather("robot_pose_in_odom")
     turn = align(world, pose[:, 2] - in_odom[:, 2], ANGLE, times)
-    half = np.column_stack([np.cos(turn / 2.0), np.sin(turn / 2.0)])
-    x, y, z, w = base[:, 3:].T
-    c, s = half.T
-    base[:, 3:] = np.column_stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z])
+    base[:, 3:] = turned(base, turn)
     for axis in (0, 1):
         base[:, axis] = align(world, pose[:, axis], LINEAR, times)
     return base
@@ -158,32 +143,3 @@ def _angles(track: Track, names: list[str], rows: Array, robot: Robot, times: Ar
         if name in names:
             angles[:, column] = align(track, rows[:, names.index(name)], LINEAR, times)
     return angles
-
-
-def _link_poses(robot: Robot, names: list[str], base: Array, angles: Array) -> NDArray[np.float32]:
-    """Return (n, links, 7) position and quaternion x, y, z, w of each link in map; NaN where not known."""
-    model = floating_model(robot)
-    data = model.createData()
-    frames = [model.getFrameId(name) for name in names]
-    found = np.full((len(base), len(names), 7), np.nan, dtype=np.float32)
-    for number, (place, joints) in enumerate(zip(base, angles, strict=True)):
-        configuration = np.concatenate([place, joints])
-        if not np.isfinite(configuration).all():
-            continue
-        pin.framesForwardKinematics(model, data, configuration)
-        for index, frame in enumerate(frames):
-            found[number, index] = pin.SE3ToXYZQUAT(data.oMf[frame])
-    return found
-
-
-def _boxes(robot: Robot, names: list[str]) -> list[dict[str, Any]]:
-    return [
-        {
-            "link": index,
-            "size": box.size,
-            "centre": box.centre,
-            "colour": COLOURS.get(box.colour, COLOURS["grey"]),
-        }
-        for index, name in enumerate(names)
-        for box in robot.link(name).boxes
-    ]

@@ -8,26 +8,21 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from tulip_description.camera_mount import load_mount
-from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.robot import Robot
 from tulip_ros import topics
-from tulip_view.columns import FEATURES, LINEAR
-from tulip_view.recording import Array, Recording, Track
+from tulip_view.camera_picture import HeadPose, decoded, lens_of, seen, with_features
+from tulip_view.columns import LINEAR
+from tulip_view.recording import Recording, Track
 from tulip_view.report.figures import LeftOut, Section, Still
 from tulip_view.tables import align
-from tulip_vision.annotation import annotate
-from tulip_vision.lens import Lens, head_camera_lens
-from tulip_vision.lines import Lines
-from tulip_vision.messages import lens_from_message, picture_from_message
-from tulip_vision.view import SpreadParameters, View
-from tulip_worldmodel.messages import features_from_message
 
 TITLE = "What the camera saw"
 NUMBER = 8
 QUALITY = 78  # of the JPEG
+WORDS = "Features of the same stamp are drawn in, with what vision thinks of their certainty (0 to 1)."
+WORDS_HERE = "Features of the same stamp are drawn in, through the lens as calibrated here: the recording has none."
 NEAR = 0.001  # [s] features of a picture carry its stamp; decimals may differ
 
 
@@ -52,57 +47,27 @@ def stills(recording: Recording, robot: Robot, picture_at: Callable[[topics.Topi
     if camera is None or features is None:
         raise LeftOut(TITLE, f"{topics.CAMERA_COMPRESSED.name if camera is None else 'features'} is not recorded")
     topic, pictures = camera
-    lens, words = _lens(recording)
+    info = recording.get(topics.CAMERA_INFO)
+    lens, recorded = lens_of(info.messages[-1] if info is not None else None)
     mount = load_mount()
-    section = Section("stills", TITLE, [words])
+    section = Section("stills", TITLE, [WORDS if recorded else WORDS_HERE])
     for index, found in _choose(pictures, features):
         time = float(pictures.times[index])
-        picture = _decoded(picture_at(topic, index))
+        picture = decoded(picture_at(topic, index))
         if picture is None:
             section.words.append(f"The picture of {time:.3f} s cannot be decoded.")
             continue
-        seen = ", ".join(_count(features.messages[found]))
-        pose = _head(recording, time)
-        if pose is None or picture.shape[:2] != (lens.height, lens.width):
-            seen += " (not drawn: attitude or lens of this picture is not known)"
-        else:
-            height, orientation, pan, tilt = pose
-            place = camera_in_footprint(robot, height, orientation, pan, tilt, mount)
-            view = View(lens, place, SpreadParameters())
-            core = features_from_message(features.messages[found])
-            picture = annotate(picture, core, view, np.empty((0, 2)), Lines((), None), ())
-        encoded, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+        words = ", ".join(seen(features.messages[found]))
+        drawn = with_features(picture, features.messages[found], _head(recording, time), lens, robot, mount)
+        if drawn is None:
+            words += " (not drawn: attitude or lens of this picture is not known)"
+        drawn = picture if drawn is None else drawn
+        encoded, data = cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         if encoded:
-            section.stills.append(Still(data.tobytes(), f"{time:.2f} s: {seen or 'nothing'}", time))
+            section.stills.append(Still(data.tobytes(), f"{time:.2f} s: {words or 'nothing'}", time))
     if not section.stills:
         raise LeftOut(TITLE, "no picture has features of the same stamp")
     return section
-
-
-def _lens(recording: Recording) -> tuple[Lens, str]:
-    track = recording.get(topics.CAMERA_INFO)
-    if track is not None:
-        try:
-            return lens_from_message(
-                track.messages[-1]
-            ), "Features of the same stamp are drawn in, with what vision thinks of their certainty (0 to 1)."
-        except ValueError:
-            pass
-    return head_camera_lens(), (
-        "Features of the same stamp are drawn in, through the lens as calibrated here: the recording has none."
-    )
-
-
-def _decoded(message: Any) -> NDArray[np.uint8] | None:
-    """Return (height, width, 3) BGR, or None for a picture that cannot be decoded."""
-    if isinstance(message, topics.CAMERA_IMAGE.message):
-        try:
-            return picture_from_message(message)
-        except ValueError:
-            return None
-    data = np.frombuffer(bytes(message.data), np.uint8)
-    picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
-    return None if picture is None else picture.astype(np.uint8)
 
 
 def _choose(pictures: Track, features: Track) -> list[tuple[int, int]]:
@@ -122,22 +87,8 @@ def _worth(message: Any) -> float:
     return len(kinds) + 0.1 * len(message.features) + (3.0 if 0 in kinds else 0.0)
 
 
-def _count(message: Any) -> list[str]:
-    """Return what was seen, in words: ball, 2 goal posts, ..."""
-    kinds = [feature.kind for feature in message.features]
-    found = []
-    for kind, name in FEATURES.items():
-        number = kinds.count(kind)
-        words = name.replace("_", " ")
-        if name.startswith("crossing"):
-            words = f"{name[-1].upper()} crossing"
-        if number:
-            found.append(words if number == 1 else f"{number} {words}s")
-    return found
-
-
-def _head(recording: Recording, time: float) -> tuple[float, Array, float, float] | None:
-    """Return height of base_link, its quaternion, pan and tilt at a time, or None where one is not known."""
+def _head(recording: Recording, time: float) -> HeadPose | None:
+    """Return how the head was at a time, or None where that is not known."""
     odometry, joints = recording.get(topics.ODOMETRY), recording.get(topics.JOINT_STATES)
     if odometry is None or joints is None or not {"head_pan", "head_tilt"} <= set(joints.messages[0].name):
         return None
@@ -153,7 +104,7 @@ def _head(recording: Recording, time: float) -> tuple[float, Array, float, float
         angles.append(float(align(_around(joints, time), values, LINEAR, np.array([time]))[0]))
     if any(math.isnan(angle) for angle in angles):
         return None
-    return float(pose.position.z), np.array([q.x, q.y, q.z, q.w]), angles[0], angles[1]
+    return HeadPose(float(pose.position.z), np.array([q.x, q.y, q.z, q.w]), angles[0], angles[1])
 
 
 def _around(track: Track, time: float) -> Track:
