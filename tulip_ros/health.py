@@ -19,6 +19,7 @@ from tulip_ros.topics import Topic
 from tulip_ros.watches import HOLD, InputWatch, TimeWatch
 
 LOOK = 0.2  # [s] of wall-clock time between two looks: a stalled simulation must still show
+LOG_PERIOD = 1.0  # [s] between two lines of the log about the same event
 LOOKS = 5  # of which one is published in any case
 
 Check = Callable[[], Finding | None]
@@ -41,6 +42,7 @@ class Health:
         self._shown: dict[str, int] = {}
         self._warning = ""
         self._warned_at = 0.0
+        self._logged: dict[str, float] = {}  # when each event's warning was last written into the log [s]
         self._level = Level.OK
         self._looks = 0
         self._last = monotonic()
@@ -67,13 +69,16 @@ class Health:
 
         Args:
             event: A few fixed words, the key in the diagnostics, as in "rejected features".
-            warning: What is wrong, in words: goes into the status, and into the log (once a second at most).
+            warning: What is wrong, in words: goes into the status, and into the log (an event once a second at most).
             times: How often it happened.
         """
         self._events[event] += times
         if warning:
-            self._warning, self._warned_at = warning, monotonic()
-            self._node.get_logger().warning(warning, throttle_duration_sec=1.0)
+            now = monotonic()
+            self._warning, self._warned_at = warning, now
+            if now - self._logged.get(event, -LOG_PERIOD) >= LOG_PERIOD:
+                self._logged[event] = now
+                self._node.get_logger().warning(warning)
 
     def _look(self) -> None:
         now = monotonic()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import time
+from collections.abc import Callable
 from xml.etree import ElementTree
 
 import numpy as np
@@ -17,11 +19,15 @@ from tulip_description.urdf import build_urdf
 from tulip_motion.interface import Odometry
 from tulip_motion.messages import body_transforms
 from tulip_msgs.msg import Feature, Features, MotionState, ObjectEstimate, WorldState
+from tulip_ros import topics
+from tulip_ros.run import session
 from tulip_view.markers import feature_markers, field_markers, motion_markers, world_markers
+from tulip_view.markers_node import MarkersNode
 from tulip_worldmodel.messages import map_to_odom_message
 from tulip_worldmodel.world_state import RobotEstimate
 from tulip_worldmodel.world_state import WorldState as World
 
+WAIT = 30.0  # [s] of wall-clock time for things that take one
 FIELD, ROBOT = load_field(), load_robot()
 
 
@@ -128,3 +134,29 @@ def test_what_the_nodes_publish_and_the_urdf_make_one_tree_from_map_with_every_f
             frame = parent.get(frame, frame)
         assert frame == frames.MAP
     assert sorted(moving) == sorted(JOINTS)  # those that joint_states names
+
+
+@pytest.mark.ros
+def test_the_node_listens_and_draws_only_while_somebody_looks(ros_domain: int) -> None:
+    drawn: list[str] = []
+    with session(MarkersNode, ["test"], handle_signals=False) as (node, spin):
+
+        def until(holds: Callable[[], object]) -> None:
+            end = time.monotonic() + WAIT
+            while not holds():
+                assert time.monotonic() < end, "it did not come to hold"
+                world.publish(WorldState())
+                spin(0.05)
+
+        def ears() -> int:
+            return int(node.count_subscribers("world_state"))
+
+        world = topics.WORLD_STATE.publish_from(node)
+        for _ in range(20):
+            spin(0.05)
+        assert ears() == 0
+        viewer = topics.MARKERS.subscribe_from(node, lambda message: drawn.extend(each.ns for each in message.markers))
+        until(lambda: {"field", "robot"} <= set(drawn))
+        assert ears() == 1
+        node.destroy_subscription(viewer)
+        until(lambda: ears() == 0)
