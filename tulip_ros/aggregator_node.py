@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tulip_ros.monitor import Monitor
-from tulip_ros.nodes import DRIVER, ROBOT
+from tulip_ros.nodes import AGGREGATOR, DRIVER, ROBOT
 from tulip_ros.run import ComponentNode, run
 
 
@@ -22,7 +22,7 @@ class AggregatorNode(ComponentNode):
 
     def __init__(self) -> None:
         """Connect."""
-        super().__init__("aggregator")
+        super().__init__(AGGREGATOR)
         p = self.load(AggregatorParameters())
         self.monitor = Monitor(self, p.expected, p.namespaces)
 

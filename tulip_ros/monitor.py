@@ -28,20 +28,24 @@ class Monitor:
     node follows, named as ROS's own diagnostic_aggregator does it: /robot/motion.
     """
 
-    def __init__(self, node: Node, expected: Sequence[str] = (), namespaces: Sequence[str] = ("",)) -> None:
+    def __init__(
+        self, node: Node, expected: Sequence[str] = (), namespaces: Sequence[str] = ("",), publishes: bool = True
+    ) -> None:
         """Connect.
 
         Args:
             node: Which listens and publishes.
             expected: Names of nodes that should be there, as in "motion" or, of several robots, "striker/motion".
             namespaces: Of the robots, below the node's own.
+            publishes: False where another one publishes the sum.
         """
         self._node = node
         self._aggregation = Aggregation((DRIVER, *ROBOT), expected, monotonic())
         for namespace in namespaces:
             topics.DIAGNOSTICS.within(namespace).subscribe_from(node, partial(self._on_diagnostics, namespace))
-        self._sender = topics.DIAGNOSTICS_AGG.publish_from(node)
-        self._timer = node.create_timer(PERIOD, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        if publishes:
+            self._sender = topics.DIAGNOSTICS_AGG.publish_from(node)
+            self._timer = node.create_timer(PERIOD, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_diagnostics(self, namespace: str, message: DiagnosticArray) -> None:
         for status in message.status:

@@ -39,6 +39,9 @@ class NodeEntry:
         return None
 
 
+AGGREGATOR = "aggregator"
+"""Name in the graph of the node that sums up the others' health."""
+
 NODES: dict[str, NodeEntry] = {
     entry.name: entry
     for entry in (
@@ -50,7 +53,7 @@ NODES: dict[str, NodeEntry] = {
         NodeEntry("game_input", "tulip_strategy.game_input_node"),
         NodeEntry("user_input", "tulip_strategy.user_input_node"),
         NodeEntry("perception", "tulip_sim.perception_node", playing=False),
-        NodeEntry("aggregator", "tulip_ros.aggregator_node", playing=False),
+        NodeEntry(AGGREGATOR, "tulip_ros.aggregator_node", playing=False),
         NodeEntry("markers", "tulip_view.markers_node", playing=False),
         NodeEntry("recorder", "tulip_ros.recorder_node", playing=False),
         NodeEntry("replay", "tulip_ros.replay_node", playing=False),

@@ -293,7 +293,7 @@ DIAGNOSTICS_AGG = Topic(
     STATE,
     ("aggregator",),
     (),
-    "the worst of all nodes' health first, then each node's; nodes that say nothing count as stale",
+    "the worst of all nodes' health, then each node's; from the launcher where it started the robot",
 )
 MARKERS = Topic(
     "markers",

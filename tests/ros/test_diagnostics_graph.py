@@ -32,7 +32,7 @@ from tulip_sim.perception import PerceptionParameters
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 WAIT = 60.0  # [s] of wall-clock time for things that take a few
-LATENCY = 0.2  # [s] of the graph's time that a picture's features may take on top
+LATENCY = 0.5  # [s] of the graph's time on top, that features may take and a node waits for a busy processor
 
 
 class Observer:
@@ -104,30 +104,32 @@ def test_doctor_says_all_well_then_names_each_fault_and_a_stopped_node_is_stale_
         assert (first.name, first.level[0], first.message) == ("/robot", Level.OK, "all nodes are well")
         assert {"/robot/driver", "/robot/motion"} < {status.name for status in graph.sums[-1].status}
 
-        a_stopped_node_is_stale_and_missed(graph)
-
+        stop_what_gives_features(graph)
         with other_program("driver"), other_program("stranger") as stranger:
             stranger.create_publisher(String, "odometry", 5)
             quality = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
             stranger.create_publisher(topics.WALK_COMMAND.message, "walk_command", quality)
-            words = [each.words for each in graph.wrong() if each.level == Level.ERROR]
+            errors = [f"{each.part}: {each.words}" for each in graph.wrong() if each.level == Level.ERROR]
         for expected in (
+            "/worldmodel: no features for",
             "2 nodes are called /driver",
             "/stranger uses /odometry as std_msgs/msg/String; expected nav_msgs/msg/Odometry",
             "/motion gets nothing of /walk_command: it asks /stranger for reliable",
             "/walk_command has 2 senders (/stranger, /strategy)",
         ):
-            assert any(expected in each for each in words), (expected, words)
+            assert any(expected in each for each in errors), (expected, errors)
+        graph.send("perception", signal.SIGCONT)
+        graph.until(lambda: graph.monitor.summary().level < Level.ERROR)
 
         graph.send("driver", signal.SIGSTOP)
         graph.until(lambda: any("time stands still" in words for _, words, _ in graph.said))
-        words = [each.words for each in graph.wrong()]
+        errors = [each.words for each in graph.wrong()]
         graph.send("driver", signal.SIGCONT)
-        assert any("time stands still" in each or "/driver is missing" in each for each in words), words
+        assert any("time stands still" in each or "/driver is missing" in each for each in errors), errors
 
 
-def a_stopped_node_is_stale_and_missed(graph: Observer) -> None:
-    """Stop what gives features: the world model misses them within their time, and the aggregator names the node."""
+def stop_what_gives_features(graph: Observer) -> None:
+    """Stop it: the world model misses features within their time, and the aggregator names the node."""
     graph.said.clear()
     graph.send("perception", signal.SIGSTOP)
     graph.until(lambda: any("no features for" in words for name, words, _ in graph.said if name == "worldmodel"))
@@ -140,7 +142,3 @@ def a_stopped_node_is_stale_and_missed(graph: Observer) -> None:
     assert whole.level == Level.ERROR
     assert whole.words.startswith("perception: says nothing for ")
     graph.until(lambda: graph.sums[-1].status[0].message.startswith("perception: says nothing for "))
-    words = [(each.part, each.words) for each in graph.wrong()]
-    assert any("/worldmodel" in part and "no features for" in each for part, each in words), words
-    graph.send("perception", signal.SIGCONT)
-    graph.until(lambda: graph.monitor.summary().level < Level.ERROR)
