@@ -1,4 +1,4 @@
-"""Write the generated parts of the pages anew: the node graph, the tables of topics, the behaviour trees."""
+"""Write the generated parts of the pages anew: the node graph, the tables of topics and of diagnostics, the trees."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tulip_description.field import load_field
+from tulip_ros.health_table import markdown_table
 from tulip_ros.topics import markdown_graph, markdown_tables
 from tulip_strategy.behaviour.tree import STRATEGIES
 from tulip_strategy.parameters import StrategyParameters
@@ -25,6 +26,7 @@ def parts() -> Iterator[tuple[str, str, str]]:
     """Return the generated parts: page, name of the block, content."""
     yield "architecture.md", "graph", markdown_graph()
     yield "architecture.md", "topics", markdown_tables()
+    yield "diagnostics.md", "health", markdown_table()
     tree = Strategy(StrategyParameters(), load_field()).tree
     yield "strategy.md", "game", mermaid(tree, 0, depth=1)
     for name in STRATEGIES:

@@ -23,7 +23,7 @@ from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, unknown
 from tulip_ros.launch import Launcher
 from tulip_ros.log_file import Log
 from tulip_ros.monitor import Monitor
-from tulip_ros.nodes import ROBOT
+from tulip_ros.nodes import AGGREGATOR, DRIVER, ROBOT
 from tulip_ros.run import ComponentNode, session
 from tulip_ros.transport import NAMES as TRANSPORTS
 from tulip_view.live.beside import PORT, address, page_beside
@@ -80,7 +80,9 @@ def keep_running(launcher: Launcher, namespace: str) -> None:
             ),
             Live(console=console, auto_refresh=False, transient=False) as live,
         ):
-            monitor = Monitor(node)
+            names = [state.name for state in launcher.states()]
+            # Who starts tools beside a running robot leaves the sum to the one who started the robot.
+            monitor = Monitor(node, names, publishes=bool({DRIVER, *ROBOT} & set(names)) and AGGREGATOR not in names)
             while True:
                 spin(LOOK)
                 for line in launcher.poll():

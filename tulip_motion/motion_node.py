@@ -23,10 +23,12 @@ from tulip_motion.messages import (
 )
 from tulip_motion.motion import Motion
 from tulip_motion.parameters import MotionParameters
+from tulip_motion.saturation import Saturation
 from tulip_msgs.action import Kick
 from tulip_msgs.msg import WalkCommand as WalkCommandMessage
 from tulip_ros import topics
 from tulip_ros.errors import BadInputError
+from tulip_ros.finding import Finding, Level
 from tulip_ros.matching import SameStamp
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.time import stamp_of
@@ -62,6 +64,8 @@ class MotionNode(ComponentNode):
         self.listen(topics.IMU, lambda message: self._on_sensor("imu", message))
         self.listen(topics.FOOT_FORCES, lambda message: self._on_sensor("foot_forces", message))
         self.listen(topics.WALK_COMMAND, self._on_walk_command)
+        self.health.check(self._joint_health)
+        self.health.check(self._motion_health)
         self._kicks = ActionServer(
             self,
             topics.KICK.type,
@@ -80,8 +84,9 @@ class MotionNode(ComponentNode):
 
     def _begin(self) -> None:
         """Make the core, and forget sensors and commands of before."""
-        self._notes: set[str] = set()  # kinds of notes in the last report
         self._footsteps_told: tuple[Footstep, ...] | None = None
+        self._notes: dict[str, str] = {}  # kind and words of the notes in the last report
+        self._saturation = Saturation(load_robot())
         self._motion = Motion(self._settings, load_robot())
         self._sensors = SameStamp("joint_states", "imu", "foot_forces")
         self._tick = 0
@@ -109,6 +114,7 @@ class MotionNode(ComponentNode):
         self._legs.publish(joint_command_to_message(self._motion.tick(sensors)))
         self._tick += 1
         if self._tick % SLOW_TICKS == 0:
+            self._saturation.add(sensors.joint_efforts)
             self._report()
 
     def _report(self) -> None:
@@ -122,9 +128,9 @@ class MotionNode(ComponentNode):
             self._footsteps_told = footsteps
             self._footsteps.publish(footsteps_to_message(footsteps, state.stamp))
         notes = {note.partition(":")[0]: note for note in state.notes}
-        for kind in notes.keys() - self._notes:
+        for kind in notes.keys() - self._notes.keys():
             self.health.count(kind, notes[kind])  # "walk command clipped", once for as long as it lasts
-        self._notes = set(notes)
+        self._notes = notes
         if state.mode is MotionMode.STAND:
             self._motion.save_learning()
         progress = self._motion.kick_progress
@@ -135,6 +141,21 @@ class MotionNode(ComponentNode):
         else:
             self._kick.done.set_result((not progress.reason, progress.reason))
             self._kick = None
+
+    def _joint_health(self) -> Finding | None:
+        """Tell which joints had no more torque to give in the last second."""
+        shares = sorted(self._saturation.take().items(), key=lambda entry: -entry[1])
+        if not shares:
+            return None
+        joints = ", ".join(f"{name} {share:.0%}" for name, share in shares)
+        return Finding(
+            Level.WARNING,
+            f"joints at their torque limit for a share of the last second ({joints}): walk slower, or free the robot",
+        )
+
+    def _motion_health(self) -> Finding | None:
+        """Tell what motion control notes for as long as it lasts, as a clipped walk command."""
+        return Finding(Level.WARNING, "; ".join(self._notes.values())) if self._notes else None
 
     def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:
         """Give the running kick up; its result comes when the robot stands or walks on."""

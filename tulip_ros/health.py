@@ -1,23 +1,33 @@
-"""A node's health, published once a second on `diagnostics`."""
+"""A node's health, published once a second on `diagnostics`, and at once when it gets worse."""
 
 from __future__ import annotations
 
 from collections import Counter
-from time import monotonic
+from collections.abc import Callable
+from functools import cache
+from importlib import metadata
+from time import monotonic, process_time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from tulip_ros import topics
+from tulip_ros.finding import Finding, Level, say, worst
 from tulip_ros.time import to_message
+from tulip_ros.topics import Topic
+from tulip_ros.watches import HOLD, InputWatch, TimeWatch
 
-PERIOD = 1.0  # [s] of wall-clock time: a stalled simulation must still show
-WARNING_HOLDS = 5.0  # [s] a warning stays in the status, so that a person sees it
+LOOK = 0.2  # [s] of wall-clock time between two looks: a stalled simulation must still show
+LOG_PERIOD = 1.0  # [s] between two lines of the log about the same event
+LOOKS = 5  # of which one is published in any case
+
+Check = Callable[[], Finding | None]
+"""Tells what is the matter right now, or None; asked once a second."""
 
 
 class Health:
-    """Counts what a node does and publishes it.
+    """Watches what a node needs, counts what it does, and publishes both.
 
     The wall clock serves here alone: rates tell how the program runs, not how the robot moves.
     """
@@ -25,54 +35,96 @@ class Health:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._publisher = topics.DIAGNOSTICS.publish_from(node)
-        self._inputs: Counter[str] = Counter()
+        self._inputs: dict[str, InputWatch] = {}
+        self._checks: list[Check] = []
+        self._found: list[Finding] = []  # by the checks and tallies of the last second
         self._events: Counter[str] = Counter()
         self._shown: dict[str, int] = {}
-        self._newest = 0
         self._warning = ""
         self._warned_at = 0.0
+        self._logged: dict[str, float] = {}  # when each event's warning was last written into the log [s]
+        self._level = Level.OK
+        self._looks = 0
         self._last = monotonic()
-        self._timer = node.create_timer(PERIOD, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._processor_time = process_time()
+        self._time = TimeWatch(self._last)
+        self._timer = node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def received(self, topic_name: str, stamp: int = 0) -> None:
-        """Count a message, with its stamp [ns] where it has one."""
-        self._inputs[topic_name] += 1
-        self._newest = max(self._newest, stamp)
+    def expect(self, topic: Topic) -> InputWatch:
+        """Return the watch over a topic that the node listens to; who listens raises its count with each message."""
+        watch = InputWatch(topic.name, topic.publishers, topic.rate, topic.missed_after, monotonic())
+        return self._inputs.setdefault(topic.name, watch)
+
+    def check(self, check: Check) -> None:
+        """Have something asked once a second, before the health is published."""
+        self._checks.append(check)
 
     def begin_anew(self) -> None:
-        """Forget the newest stamp: time began anew."""
-        self._newest = 0
+        """Forget the stamps: time began anew."""
+        for watch in self._inputs.values():
+            watch.begin_anew()
 
     def count(self, event: str, warning: str = "", times: int = 1) -> None:
         """Count an event.
 
         Args:
             event: A few fixed words, the key in the diagnostics, as in "rejected features".
-            warning: What is wrong, in words: goes into the status, and into the log (once a second at most).
+            warning: What is wrong, in words: goes into the status, and into the log (an event once a second at most).
             times: How often it happened.
         """
         self._events[event] += times
         if warning:
-            self._warning, self._warned_at = warning, monotonic()
-            self._node.get_logger().warning(warning, throttle_duration_sec=1.0)
+            now = monotonic()
+            self._warning, self._warned_at = warning, now
+            if now - self._logged.get(event, -LOG_PERIOD) >= LOG_PERIOD:
+                self._logged[event] = now
+                self._node.get_logger().warning(warning)
 
-    def _publish(self) -> None:
+    def _look(self) -> None:
         now = monotonic()
-        elapsed, self._last = now - self._last, now
-        values = [
-            KeyValue(key=f"rate {name} [1/s]", value=f"{(count - self._shown.get(name, 0)) / elapsed:.1f}")
-            for name, count in sorted(self._inputs.items())
-        ]
-        self._shown = dict(self._inputs)
-        values += [KeyValue(key=event, value=str(count)) for event, count in sorted(self._events.items())]
-        warns = bool(self._warning) and now - self._warned_at < WARNING_HOLDS
+        self._looks += 1
+        due = self._looks % LOOKS == 0
+        if due:
+            asked = [check() for check in self._checks] + [watch.tally() for watch in self._inputs.values()]
+            self._found = [finding for finding in asked if finding is not None]
+        time = self._node.get_clock().now().nanoseconds
+        watched = [self._time.look(now, time), *(watch.look(now, time) for watch in self._inputs.values())]
+        findings = self._found + [finding for finding in watched if finding is not None]
+        if self._warning and now - self._warned_at < HOLD:
+            findings.append(Finding(Level.WARNING, self._warning))
+        level = worst(findings)
+        if due or level > self._level:
+            self._publish(now, level, say(findings))
+        self._level = level
+
+    def _publish(self, now: float, level: Level, words: str) -> None:
+        elapsed, self._last = max(now - self._last, 1e-3), now
+        busy, self._processor_time = process_time() - self._processor_time, process_time()
+        values = {
+            f"rate {name} [1/s]": f"{(watch.count - self._shown.get(name, 0)) / elapsed:.1f}"
+            for name, watch in sorted(self._inputs.items())
+        }
+        self._shown = {name: watch.count for name, watch in self._inputs.items()}
+        values |= {event: str(count) for event, count in sorted(self._events.items())}
+        values |= {"processor [%]": f"{100.0 * busy / elapsed:.1f}", "version": version()}
+        if self._time.jumps:
+            values["jumps of the clock"] = str(self._time.jumps)
         status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if warns else DiagnosticStatus.OK,
+            level=bytes([level]),
             name=self._node.get_name(),
-            message=self._warning if warns else "running",
+            message=words or "running",
             hardware_id=self._node.get_namespace(),
-            values=values,
+            values=[KeyValue(key=key, value=value) for key, value in values.items()],
         )
         message = DiagnosticArray(status=[status])
-        message.header.stamp = to_message(self._newest)
+        message.header.stamp = to_message(max((watch.stamp for watch in self._inputs.values()), default=0))
         self._publisher.publish(message)
+
+
+@cache
+def version() -> str:
+    """Return the project's version as installed, or "unknown" where the packages only lie in the path."""
+    try:
+        return metadata.version("tulip-soccer")
+    except metadata.PackageNotFoundError:
+        return "unknown"

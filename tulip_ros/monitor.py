@@ -1,71 +1,120 @@
-"""What the nodes say about themselves, and a table of it for people."""
+"""Listens to what the nodes say about themselves; publishes the sum of it, and makes a table of it for people."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from time import monotonic
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rich.table import Table
 
 from tulip_ros import topics
+from tulip_ros.aggregation import NOT_HEARD, Aggregation, Report
+from tulip_ros.finding import Level
 from tulip_ros.launch import ProcessState
+from tulip_ros.nodes import DRIVER, ROBOT
 
-SILENT = 3.0  # [s] without diagnostics, which come each second, before a node counts as silent
-STYLES = {"ok": "green", "warning": "yellow", "silent": "red", "starting": "dim"}
+PERIOD = 1.0  # [s] of wall-clock time between two sums, as between two reports of a node
+STYLES = {"ok": "green", "warning": "yellow", "error": "red", "stale": "red", "starting": "dim"}
 
 
 class Monitor:
-    """Listens to the diagnostics of all nodes in a node's namespace."""
+    """The aggregator: listens to `diagnostics`, publishes `diagnostics_agg`.
 
-    def __init__(self, node: Node) -> None:
-        self._heard: dict[str, tuple[float, DiagnosticStatus]] = {}
-        topics.DIAGNOSTICS.subscribe_from(node, self._on_diagnostics)
+    The first status of the sum is the whole: the worst level, and the one sentence that matters most. A status for each
+    node follows, named as ROS's own diagnostic_aggregator does it: /robot/motion.
+    """
 
-    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+    def __init__(
+        self, node: Node, expected: Sequence[str] = (), namespaces: Sequence[str] = ("",), publishes: bool = True
+    ) -> None:
+        """Connect.
+
+        Args:
+            node: Which listens and publishes.
+            expected: Names of nodes that should be there, as in "motion" or, of several robots, "striker/motion".
+            namespaces: Of the robots, below the node's own.
+            publishes: False where another one publishes the sum.
+        """
+        self._node = node
+        self._aggregation = Aggregation((DRIVER, *ROBOT), expected, monotonic())
+        for namespace in namespaces:
+            topics.DIAGNOSTICS.within(namespace).subscribe_from(node, partial(self._on_diagnostics, namespace))
+        if publishes:
+            self._sender = topics.DIAGNOSTICS_AGG.publish_from(node)
+            self._timer = node.create_timer(PERIOD, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _on_diagnostics(self, namespace: str, message: DiagnosticArray) -> None:
         for status in message.status:
-            self._heard[status.name] = (monotonic(), status)
+            name = f"{namespace}/{status.name}" if namespace else status.name
+            self._aggregation.hear(name, report_from_status(status), monotonic())
 
-    def health(self, name: str) -> str:
-        """Return "ok", "warning", "silent" or "starting" (not heard yet)."""
-        if name not in self._heard:
-            return "starting"
-        when, status = self._heard[name]
-        if monotonic() - when > SILENT:
-            return "silent"
-        return "warning" if status.level != DiagnosticStatus.OK else "ok"
+    def _publish(self) -> None:
+        now = monotonic()
+        root = self._node.get_namespace().rstrip("/") or "/robot"
+        statuses = [_status(root, self._aggregation.summary(now))]
+        statuses += [_status(f"{root}/{name}", report) for name, report in self._aggregation.reports(now).items()]
+        message = DiagnosticArray(status=statuses)
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._sender.publish(message)
 
-    def message(self, name: str) -> str:
-        """Return what the node says about itself, or ""."""
-        return str(self._heard[name][1].message) if name in self._heard else ""
+    def summary(self) -> Report:
+        """Return the worst level and the one sentence that matters most."""
+        return self._aggregation.summary(monotonic())
 
-    def rates(self, name: str) -> dict[str, float]:
-        """Return how many messages [1/s] a node takes in, by topic."""
-        if name not in self._heard:
-            return {}
-        pairs = ((pair.key, pair.value) for pair in self._heard[name][1].values)
-        return {
-            key.removeprefix("rate ").removesuffix(" [1/s]"): float(value)
-            for key, value in pairs
-            if key.startswith("rate ")
-        }
+    def reports(self) -> dict[str, Report]:
+        """Return how each node is."""
+        return self._aggregation.reports(monotonic())
 
     def table(self, states: Sequence[ProcessState]) -> Table:
-        """Return a table of all processes."""
-        table = Table(box=None, pad_edge=False)
-        for column in ("node", "process", "restarts", "health", "fastest input [1/s]", "says"):
+        """Return a table of all processes, with the sum as its title."""
+        whole, reports = self.summary(), self.reports()
+        style = STYLES[_word(whole)]
+        table = Table(box=None, pad_edge=False, title=f"[{style}]{whole.words}[/]", title_justify="left")
+        for column in ("node", "process", "restarts", "health", "processor", "fastest input [1/s]", "says"):
             table.add_column(column)
         for state in states:
-            health = self.health(state.name) if state.state == "running" else state.state
-            rates = self.rates(state.name) if state.state == "running" else {}
+            report = reports.get(state.name, Report(Level.OK, NOT_HEARD)) if state.state == "running" else None
+            word = state.state if report is None else _word(report)
+            rates = {} if report is None else input_rates(report)
             fastest = max(rates, key=lambda topic: rates[topic], default="")
             table.add_row(
                 state.name,
                 str(state.pid or "-"),
                 str(state.restarts),
-                f"[{STYLES.get(health, 'red')}]{health}[/]",
+                f"[{STYLES.get(word, 'red')}]{word}[/]",
+                "" if report is None else f"{report.values.get('processor [%]', '-')} %",
                 f"{rates[fastest]:.0f} {fastest}" if fastest else "-",
-                self.message(state.name) if state.state == "running" else "",
+                "" if report is None else report.words,
             )
         return table
+
+
+def report_from_status(status: DiagnosticStatus) -> Report:
+    """Return what a node says about itself."""
+    return Report(Level(status.level[0]), status.message, {pair.key: pair.value for pair in status.values})
+
+
+def input_rates(report: Report) -> dict[str, float]:
+    """Return how many messages [1/s] a node takes in, by topic."""
+    return {
+        key.removeprefix("rate ").removesuffix(" [1/s]"): float(value)
+        for key, value in report.values.items()
+        if key.startswith("rate ")
+    }
+
+
+def _word(report: Report) -> str:
+    return "starting" if report.words == NOT_HEARD else report.level.name.lower()
+
+
+def _status(name: str, report: Report) -> DiagnosticStatus:
+    return DiagnosticStatus(
+        level=bytes([report.level]),
+        name=name,
+        message=report.words,
+        values=[KeyValue(key=key, value=value) for key, value in report.values.items()],
+    )

@@ -39,6 +39,9 @@ class NodeEntry:
         return None
 
 
+AGGREGATOR = "aggregator"
+"""Name in the graph of the node that sums up the others' health."""
+
 NODES: dict[str, NodeEntry] = {
     entry.name: entry
     for entry in (
@@ -51,6 +54,8 @@ NODES: dict[str, NodeEntry] = {
         NodeEntry("user_input", "tulip_strategy.user_input_node"),
         NodeEntry("perception", "tulip_sim.perception_node", playing=False),
         NodeEntry("identify", "tulip_motion.identification.identify_node", playing=False),
+        NodeEntry(AGGREGATOR, "tulip_ros.aggregator_node", playing=False),
+        NodeEntry("markers", "tulip_view.markers_node", playing=False),
         NodeEntry("recorder", "tulip_ros.recorder_node", playing=False),
         NodeEntry("replay", "tulip_ros.replay_node", playing=False),
         NodeEntry("view", "tulip_view.live.view_node", playing=False),
@@ -58,12 +63,15 @@ NODES: dict[str, NodeEntry] = {
 }
 """All nodes but the driver, by name."""
 
+DRIVER = "driver"
+"""Name in the graph of whatever stands for the robot's body."""
+
 DRIVERS: dict[str, NodeEntry] = {
-    "sim": NodeEntry("driver", "tulip_sim.driver_node", playing=False),
-    "match": NodeEntry("driver", "tulip_sim.match_driver_node", playing=False),
-    "log": NodeEntry("driver", "tulip_sim.log_driver_node", playing=False),
+    "sim": NodeEntry(DRIVER, "tulip_sim.driver_node", playing=False),
+    "match": NodeEntry(DRIVER, "tulip_sim.match_driver_node", playing=False),
+    "log": NodeEntry(DRIVER, "tulip_sim.log_driver_node", playing=False),
 }
-"""What can stand for the robot's body, for the bodies of two, or for a recorded one: each is a node named "driver"."""
+"""What can stand for the robot's body, for the bodies of two, or for a recorded one: each is a node named DRIVER."""
 
 ROBOT: tuple[str, ...] = tuple(name for name, entry in NODES.items() if entry.playing)
 """The nodes that make the robot play, in the order of the data flow."""

@@ -88,7 +88,7 @@ class ComponentNode(Node):
         return topic.publish_from(self)
 
     def listen(self, topic: Topic, callback: Callable[[Any], None], depth: int | None = None) -> Subscription:
-        """Call back with each message of a topic; the messages are counted for the diagnostics.
+        """Call back with each message of a topic; the diagnostics tell how many come, and when they are missed.
 
         When stamps jump back, the simulation was begun anew: `begin_anew` is called first, and messages from before
         that other topics still deliver are dropped. Latched topics tell no time, since their last message may be old,
@@ -101,18 +101,19 @@ class ComponentNode(Node):
         """
         has_header = "header" in topic.message.get_fields_and_field_types()
         tells_time = has_header and not topic.quality.latched and len(topic.publishers) == 1
-        received, see, name = self.health.received, self._timeline.see, topic.name
+        see, name, watch = self._timeline.see, topic.name, self.health.expect(topic)
 
         def counted(message: Any) -> None:
-            stamp = stamp_of(message) if tells_time else 0
             if tells_time:
+                stamp = stamp_of(message)
                 arrival = see(name, stamp)
                 if arrival is Arrival.OLD:
                     self.health.count("messages from before time began anew")
                     return
                 if arrival is Arrival.ANEW:
                     self._time_went_back()
-            received(name, stamp)
+                watch.stamp = max(watch.stamp, stamp)
+            watch.count += 1
             callback(message)
 
         return topic.subscribe_from(self, counted, depth=depth)

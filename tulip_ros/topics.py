@@ -21,6 +21,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, Imu, JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import MarkerArray
 
 from tulip_msgs.action import Kick
 from tulip_msgs.msg import (
@@ -83,6 +84,8 @@ class Topic:
         publishers: Names of the nodes that publish it.
         subscribers: Names of the nodes that listen, without tools (recorder, viewers).
         meaning: What it carries.
+        rate: How often it comes while a robot plays [1/s], in the graph's time; 0 for one that comes on events.
+        missed_after: Without it for so long [s], its listeners miss it (see `tulip_ros.watches`); 0: they never do.
     """
 
     name: str
@@ -91,6 +94,8 @@ class Topic:
     publishers: tuple[str, ...]
     subscribers: tuple[str, ...]
     meaning: str
+    rate: float = 0.0
+    missed_after: float = 0.0
 
     @property
     def type_name(self) -> str:
@@ -144,7 +149,14 @@ def type_name(interface: type[Any]) -> str:
 ALL_NODES = ("driver", "vision", "worldmodel", "head", "motion", "strategy", "game_input", "user_input")
 
 CAMERA_IMAGE = Topic(
-    "camera/image_raw", Image, PICTURE, ("driver",), ("vision",), "picture of the head camera, bgr8, distorted"
+    "camera/image_raw",
+    Image,
+    PICTURE,
+    ("driver",),
+    ("vision",),
+    "picture of the head camera, bgr8, distorted",
+    rate=15.6,
+    missed_after=0.5,
 )
 CAMERA_COMPRESSED = Topic(
     "camera/image_raw/compressed",
@@ -162,15 +174,50 @@ JOINT_STATES = Topic(
     ("driver",),
     ("motion", "head", "vision", "perception"),
     "14 joints: [rad], [rad/s], [N m]",
+    rate=250,
+    missed_after=0.1,
 )
-IMU = Topic("imu", Imu, CONTROL, ("driver",), ("motion",), "inertial unit in the trunk, in imu_link")
-FOOT_FORCES = Topic("foot_forces", FootForces, CONTROL, ("driver",), ("motion",), "four force cells a foot and the CoP")
-LEG_COMMAND = Topic("legs/joint_command", JointCommand, CONTROL, ("motion",), ("driver",), "to the 12 leg joints")
+IMU = Topic(
+    "imu", Imu, CONTROL, ("driver",), ("motion",), "inertial unit in the trunk, in imu_link", rate=250, missed_after=0.1
+)
+FOOT_FORCES = Topic(
+    "foot_forces",
+    FootForces,
+    CONTROL,
+    ("driver",),
+    ("motion",),
+    "four force cells a foot and the CoP",
+    rate=250,
+    missed_after=0.1,
+)
+LEG_COMMAND = Topic(
+    "legs/joint_command",
+    JointCommand,
+    CONTROL,
+    ("motion",),
+    ("driver",),
+    "to the 12 leg joints",
+    rate=250,
+    # not missed_after: the driver tells of commands that outlived their time-to-live
+)
 HEAD_JOINT_COMMAND = Topic(
-    "head/joint_command", JointCommand, CONTROL, ("head",), ("driver",), "to head_pan and head_tilt"
+    "head/joint_command",
+    JointCommand,
+    CONTROL,
+    ("head",),
+    ("driver",),
+    "to head_pan and head_tilt",
+    rate=50,
 )
 FEATURES = Topic(
-    "features", Features, STATE, ("vision", "perception"), ("worldmodel",), "features of one picture, two angles each"
+    "features",
+    Features,
+    STATE,
+    ("vision", "perception"),
+    ("worldmodel",),
+    "features of one picture, two angles each",
+    rate=15.6,
+    missed_after=0.5,
 )
 VISION_PICTURE = Topic("vision/picture", Image, PICTURE, ("vision",), (), "picture with the features drawn in")
 ODOMETRY = Topic(
@@ -180,9 +227,18 @@ ODOMETRY = Topic(
     ("motion",),
     ("worldmodel", "vision", "perception"),
     "dead reckoning: base_link in odom",
+    rate=50,
+    missed_after=0.2,
 )
 MOTION_STATE = Topic(
-    "motion_state", MotionState, CONTROL, ("motion",), ("strategy", "game_input"), "everything about the legs"
+    "motion_state",
+    MotionState,
+    CONTROL,
+    ("motion",),
+    ("strategy", "game_input"),
+    "everything about the legs",
+    rate=50,
+    missed_after=0.5,
 )
 FOOTSTEPS = Topic(
     "footsteps",
@@ -193,7 +249,14 @@ FOOTSTEPS = Topic(
     "the walk's next footsteps, whenever they change: soles in odom, the one under way first; none while it stands",
 )
 WORLD_STATE = Topic(
-    "world_state", WorldState, STATE, ("worldmodel",), ("strategy", "game_input"), "robot, ball and opponents"
+    "world_state",
+    WorldState,
+    STATE,
+    ("worldmodel",),
+    ("strategy", "game_input"),
+    "robot, ball and opponents",
+    rate=50,
+    missed_after=0.5,
 )
 ROBOT_POSE = Topic(
     "robot_pose", PoseWithCovarianceStamped, STATE, ("worldmodel",), (), "base_footprint in map, for standard viewers"
@@ -201,8 +264,26 @@ ROBOT_POSE = Topic(
 TF = Topic("tf", TFMessage, EVENTS, ("worldmodel", "motion"), (), "map to odom; odom to base_footprint to base_link")
 GAME_STATE = Topic("game_state", GameState, LATCHED, ("game_input",), ("strategy",), "the referee's view of the game")
 USER_COMMAND = Topic("user_command", UserCommand, LATCHED, ("user_input",), ("strategy",), "the user's last wish")
-WALK_COMMAND = Topic("walk_command", WalkCommand, CONTROL, ("strategy",), ("motion",), "velocity or goal for the legs")
-HEAD_COMMAND = Topic("head_command", HeadCommand, CONTROL, ("strategy",), ("head",), "what the head shall look at")
+WALK_COMMAND = Topic(
+    "walk_command",
+    WalkCommand,
+    CONTROL,
+    ("strategy",),
+    ("motion",),
+    "velocity or goal for the legs",
+    rate=50,
+    missed_after=0.5,
+)
+HEAD_COMMAND = Topic(
+    "head_command",
+    HeadCommand,
+    CONTROL,
+    ("strategy",),
+    ("head",),
+    "what the head shall look at",
+    rate=50,
+    missed_after=0.5,
+)
 DECISION = Topic("decision", Decision, STATE, ("strategy",), (), "what strategy decided and why (behaviour tree)")
 BEHAVIOUR_TREE = Topic(
     "behaviour_tree",
@@ -214,6 +295,22 @@ BEHAVIOUR_TREE = Topic(
 )
 ROBOT_DESCRIPTION = Topic("robot_description", String, LATCHED, ("driver",), (), "URDF of the robot, for viewers")
 DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, EVENTS, ALL_NODES, (), "health of each node, once a second")
+DIAGNOSTICS_AGG = Topic(
+    "diagnostics_agg",
+    DiagnosticArray,
+    STATE,
+    ("aggregator",),
+    (),
+    "the worst of all nodes' health, then each node's; from the launcher where it started the robot",
+)
+MARKERS = Topic(
+    "markers",
+    MarkerArray,
+    STATE,
+    ("markers",),
+    (),
+    "what the robot knows and plans, to be drawn by RViz; if listened to",
+)
 START_POSE = Topic(
     "initialpose",
     PoseWithCovarianceStamped,
@@ -240,8 +337,10 @@ GROUND_TRUTH = Topic(
     ("driver",),
     ("perception",),
     "what really is; no component that plays may listen",
+    rate=50,
+    missed_after=0.5,
 )
-CLOCK = Topic("/clock", Clock, Quality(depth=1), ("driver",), ALL_NODES, "time of the simulation, 50 Hz")
+CLOCK = Topic("/clock", Clock, Quality(depth=1), ("driver",), ALL_NODES, "time of the simulation, 50 Hz", rate=50)
 
 TOPICS: tuple[Topic, ...] = (
     CAMERA_IMAGE,
@@ -268,6 +367,8 @@ TOPICS: tuple[Topic, ...] = (
     BEHAVIOUR_TREE,
     ROBOT_DESCRIPTION,
     DIAGNOSTICS,
+    DIAGNOSTICS_AGG,
+    MARKERS,
     START_POSE,
     REPORT,
     IDENTIFICATION,

@@ -60,6 +60,20 @@ def remove_leftovers() -> None:
                     leftover.unlink()
 
 
+def leftovers() -> set[Path]:
+    """Return the files of Fast DDS in shared memory that no living process has open, as far as this user may look."""
+    files = {path for path in SHARED_MEMORY.glob("fastrtps_*") if _owner(path) == os.getuid()}
+    mapped = {path.name for path in _mapped()}
+    return {path for path in files if re.sub(r"_(el|sl)$", "", path.name) not in mapped}
+
+
+def _owner(path: Path) -> int | None:
+    try:
+        return path.stat().st_uid
+    except OSError:
+        return None
+
+
 def _mapped() -> set[Path]:
     """Return the files of Fast DDS in shared memory that a process has open, as far as this user may look."""
     found: set[Path] = set()

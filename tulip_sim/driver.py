@@ -80,6 +80,10 @@ class JointDriver:
         self._next_change = min(other.next_change for other in self._groups.values())
         return ""
 
+    def silent_joints(self, now: int) -> tuple[str, ...]:
+        """Return the joints whose last command is older than its time-to-live at a time [ns]."""
+        return tuple(name for names, group in self._groups.items() if now >= group.expires for name in names)
+
     def torques(self, now: int, positions: Array, velocities: Array) -> Array:
         """Return (n,) torques [N m] for this millisecond.
 

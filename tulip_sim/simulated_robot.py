@@ -101,6 +101,10 @@ class SimulatedRobot:
         """Give a command to the driver at a time [ns]; return "" or the reason why it did not take it."""
         return self._driver.accept(command, now)
 
+    def silent_joints(self, now: int) -> tuple[str, ...]:
+        """Return the joints that are only damped or limp at a time [ns], since nobody commands them any more."""
+        return self._driver.silent_joints(now)
+
     def drive(self, now: int) -> None:
         """Put the torques of the next millisecond on the joints, and a push on the trunk while there is one."""
         effort = self._driver.torques(now, self.joint_positions, self.joint_velocities)

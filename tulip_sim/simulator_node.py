@@ -19,12 +19,13 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 
 from tulip_description.field import load_field
-from tulip_description.robot import load_robot
+from tulip_description.robot import HEAD_JOINTS, LEG_JOINTS, load_robot
 from tulip_description.urdf import build_urdf
 from tulip_motion.messages import joint_command_from_message, sensors_to_messages
 from tulip_msgs.msg import FootForces
 from tulip_msgs.msg import JointCommand as JointCommandMessage
 from tulip_ros import topics
+from tulip_ros.finding import Finding, Level
 from tulip_ros.run import ComponentNode
 from tulip_ros.time import stamp_of, to_message
 from tulip_sim.camera import CameraParameters, CameraRenderer
@@ -111,6 +112,9 @@ class RobotPort:
         self._joints, self._imu, self._forces, self._pictures, self._compressed, self._truth = senders[:6]
         self._lens_sender, self._description = senders[6:]
         self._description.publish(String(data=build_urdf(body)))
+        self._late = 0  # answers that were not in when they were due, in the last second
+        self._name = f"{namespace}: " if namespace else ""
+        node.health.check(self._command_health)
         node.listen(topics.LEG_COMMAND.within(namespace), self._on_legs)
         node.listen(topics.HEAD_JOINT_COMMAND.within(namespace), self._on_head)
 
@@ -144,6 +148,8 @@ class RobotPort:
 
     def obey(self) -> None:
         """Give the answer to the joints, and ask for the next."""
+        if not self.answered:
+            self._late += 1
         if self._answer is not None:
             self._apply(self._answer)
             self._answer = None
@@ -160,6 +166,26 @@ class RobotPort:
         self._pictures.publish(picture_to_message(picture, truth.stamp))
         if self._compressed.get_subscription_count() > 0:
             self._compressed.publish(jpeg_to_message(picture, truth.stamp))
+
+    def _command_health(self) -> Finding | None:
+        """Tell how the joints are commanded: too late, or not at all any more."""
+        late, self._late = self._late, 0
+        silent = set(self._node.world.silent_joints(self._robot))
+        parts = [part for part, joints in (("legs", LEG_JOINTS), ("head", HEAD_JOINTS)) if silent & set(joints)]
+        if parts:
+            nodes = " and ".join({"legs": "motion", "head": "head"}[part] for part in parts)
+            return Finding(
+                Level.ERROR,
+                f"{self._name}commands of the {' and '.join(parts)} outlived their time-to-live, the joints are only"
+                f" damped or limp: look after {nodes}",
+            )
+        if not late:
+            return None
+        self._node.health.count("late answers", times=late)
+        return Finding(
+            Level.WARNING,
+            f"{self._name}{late} leg commands came too late in the last second: free the processor for motion",
+        )
 
     def _is_from_before(self, message: JointCommandMessage) -> bool:
         """Tell whether a command answers sensors that are still to come: it was on its way when time began anew."""

@@ -103,6 +103,10 @@ class World:
         """
         return self.robots[robot].accept(command, self._now)
 
+    def silent_joints(self, robot: int = 0) -> tuple[str, ...]:
+        """Return a robot's joints whose last command outlived its time-to-live."""
+        return self.robots[robot].silent_joints(self._now)
+
     def advance(self, milliseconds: int) -> None:
         """Let time pass.
 

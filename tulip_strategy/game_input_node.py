@@ -10,6 +10,7 @@ from rclpy.serialization import deserialize_message
 from tulip_msgs.msg import MotionState, WorldState
 from tulip_ros import topics
 from tulip_ros.errors import BadInputError
+from tulip_ros.finding import Finding, Level
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.time import stamp_of
 from tulip_strategy.complaints import Complaints
@@ -21,6 +22,7 @@ POLL = 0.02  # [s] of wall-clock time between two looks at the socket: short aga
 MOST_PACKETS = 50  # a look; a flood must not stop the node
 DATAGRAM = 2048  # [B] more than any version's packet, so that a wrong size shows
 REPLY_PERIOD = 1.0  # [s] of wall-clock time, which the referee program goes by
+REFUSED_LATELY = 2_000_000_000  # [ns] four packets of a referee that sends at 2 Hz
 STATUS_AGE = 2_000_000_000  # [ns] an older status is not told: nobody knows whether it still holds
 
 
@@ -62,6 +64,9 @@ class GameInputNode(ComponentNode):
         # Not deserialized before a reply needs them: that is once a second, and the legs' state comes at 250 Hz.
         topics.MOTION_STATE.subscribe_from(self, self._on_motion, raw=True, depth=1)
         topics.WORLD_STATE.subscribe_from(self, self._on_world, raw=True, depth=1)
+        self._motion_watch = self.health.expect(topics.MOTION_STATE)
+        self._world_watch = self.health.expect(topics.WORLD_STATE)
+        self.health.check(self._referee_health)
         self.every(POLL, self._poll)
         self.every(REPLY_PERIOD, self._reply)
 
@@ -73,6 +78,7 @@ class GameInputNode(ComponentNode):
         self._motion: bytes | None = None
         self._world: bytes | None = None
         self._stale = False
+        self._refused: tuple[int, str] | None = None  # when the last packet was refused [ns], and why
 
     def destroy_node(self) -> None:
         """Close the socket and end the node."""
@@ -94,11 +100,11 @@ class GameInputNode(ComponentNode):
         return opened
 
     def _on_motion(self, data: bytes) -> None:
-        self.health.received(topics.MOTION_STATE.name)
+        self._motion_watch.count += 1
         self._motion = data
 
     def _on_world(self, data: bytes) -> None:
-        self.health.received(topics.WORLD_STATE.name)
+        self._world_watch.count += 1
         self._world = data
 
     def _poll(self) -> None:
@@ -120,6 +126,7 @@ class GameInputNode(ComponentNode):
         stamp = self._now()
         rejected = self._input.receive(data, stamp)
         if rejected is not None:
+            self._refused = (stamp, rejected.reason)
             is_new = self._complaints.is_new(rejected.reason, stamp)
             self.health.count(f"rejected packets ({rejected.fault.value})", rejected.reason if is_new else "")
             return
@@ -166,6 +173,25 @@ class GameInputNode(ComponentNode):
             self._publish(self._now())
             if state.stale:
                 self.health.count("silences", f"no packet from the referee for {self._settings.stale_after} s")
+
+    def _referee_health(self) -> Finding | None:
+        """Tell how the referee is heard: what it sends that cannot be used, or that it is silent."""
+        now = self._now()
+        state = self._input.state(now)
+        if self._refused is not None and abs(now - self._refused[0]) < REFUSED_LATELY:
+            reason = f"packets refused: {self._refused[1]}"
+            if state is None or state.stale:
+                return Finding(Level.ERROR, f"the referee is not understood, {reason}")
+            return Finding(Level.WARNING, reason)
+        if state is None:
+            return Finding(Level.OK, f"no packet from a referee yet on UDP {self._settings.port}")
+        if state.stale:
+            silence = (now - state.stamp) / 1e9
+            return Finding(
+                Level.WARNING,
+                f"no packet from the referee for {silence:.0f} s: look after its program and the network",
+            )
+        return None
 
     def _publish(self, stamp: int) -> None:
         state = self._input.state(stamp)

@@ -12,7 +12,9 @@ from pathlib import Path
 import pytest
 
 from tulip_ros import transport
+from tulip_ros.aggregation import Report
 from tulip_ros.errors import BadInputError
+from tulip_ros.finding import Level
 from tulip_ros.launch import DEATHS, Launcher
 from tulip_ros.monitor import Monitor
 from tulip_ros.nodes import NodeEntry
@@ -117,10 +119,10 @@ def test_monitor_hears_a_launched_node_and_its_recording_ends_with_it(ros_domain
         Launcher(plan, tmp_path / "logs") as launcher,
         session(lambda: ComponentNode("listener", namespace="striker"), ["test"], handle_signals=False) as (node, spin),
     ):
-        monitor = Monitor(node)
-        assert monitor.health("recorder") == "starting"
-        wait_for(lambda: spin(0.1) or monitor.health("recorder") == "ok")
-        assert "/striker/diagnostics" in monitor.rates("recorder") or monitor.rates("recorder") == {}
+        monitor = Monitor(node, ["recorder"])
+        assert monitor.summary() == Report(Level.OK, "waits for recorder")
+        wait_for(lambda: spin(0.1) or "processor [%]" in monitor.reports()["recorder"].values)
+        assert monitor.summary() == Report(Level.OK, "all nodes are well")
         assert monitor.table(launcher.states()).row_count == 1
     assert (tmp_path / "bag" / "metadata.yaml").exists()
     assert launcher.states()[0].exit_code == 0

@@ -6,8 +6,11 @@ import importlib.util
 import re
 from pathlib import Path
 
+import pytest
+
 from tulip_ros import topics
 from tulip_ros.nodes import DRIVERS, NODES, ROBOT
+from tulip_sim.timing import CAMERA_TICKS, DECISION_TICKS, SLOW_TICKS, TICK
 
 NAME = re.compile(r"[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*")
 
@@ -45,6 +48,20 @@ def test_every_playing_node_hears_and_says_something():
         assert said, name
     hearing = {name for name in ROBOT if {topic.name for topic in topics.heard_by(name)} - {"/clock"}}
     assert set(ROBOT) - hearing == {"user_input"}  # it hears the user
+
+
+def test_an_input_that_is_missed_comes_several_times_before_that() -> None:
+    for topic in topics.TOPICS:
+        assert topic.missed_after == 0.0 or topic.missed_after * topic.rate > 5.0, topic.name
+        assert topic.rate >= 0.0 and topic.missed_after >= 0.0
+
+
+def test_rates_are_those_of_the_simulation() -> None:
+    ticks = 1000 / TICK
+    assert topics.JOINT_STATES.rate == topics.LEG_COMMAND.rate == ticks
+    assert topics.ODOMETRY.rate == topics.CLOCK.rate == topics.GROUND_TRUTH.rate == ticks / SLOW_TICKS
+    assert topics.WORLD_STATE.rate == topics.WALK_COMMAND.rate == ticks / DECISION_TICKS
+    assert topics.CAMERA_IMAGE.rate == topics.FEATURES.rate == pytest.approx(ticks / CAMERA_TICKS, rel=0.01)
 
 
 def test_table_has_a_line_for_each_topic_and_service():

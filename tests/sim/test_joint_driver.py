@@ -139,3 +139,16 @@ def test_a_joint_has_one_sender() -> None:
 def test_table_variant_has_a_driver_of_twelve_joints() -> None:
     under_test = JointDriver(load_robot("table"), DriverParameters(), np.zeros(12))
     assert under_test.torques(0, np.zeros(12), np.zeros(12)).shape == (12,)
+
+
+def test_joints_are_silent_once_their_last_command_outlived_its_time_to_live() -> None:
+    under_test = driver()
+    assert under_test.silent_joints(10**12) == ()  # nobody ever commanded them: they hold the start posture
+    under_test.accept(command(LEG_JOINTS), 0)
+    under_test.accept(command(HEAD_JOINTS), 50 * MILLISECOND)
+    live = DriverParameters().time_to_live
+    assert under_test.silent_joints((live - 1) * MILLISECOND) == ()
+    assert under_test.silent_joints(live * MILLISECOND) == LEG_JOINTS
+    assert under_test.silent_joints((live + 50) * MILLISECOND) == LEG_JOINTS + HEAD_JOINTS
+    under_test.accept(command(LEG_JOINTS, sequence=2), 200 * MILLISECOND)
+    assert under_test.silent_joints(200 * MILLISECOND) == HEAD_JOINTS

@@ -20,6 +20,7 @@ from tulip_motion.interface import HeadCommand, HeadMode, MotionMode, WalkComman
 from tulip_motion.messages import motion_state_to_message
 from tulip_ros import topics
 from tulip_ros.errors import BadInputError
+from tulip_ros.finding import Level
 from tulip_ros.run import session
 from tulip_sim.referee_udp import RefereeSocket
 from tulip_strategy.game_controller import Reply
@@ -127,6 +128,21 @@ def test_game_input_says_when_the_referee_is_silent() -> None:
         sent.send(write(7, 3))
         until(lambda: len(states) == 2)
         assert [state.stale for state in states] == [False, True]
+
+
+def test_a_referee_of_another_version_is_an_error_of_game_input_and_without_one_it_is_well() -> None:
+    port = free_port()
+    with running(GameInputNode, f"port:={port}") as (node, until), RefereeSocket(port=port) as sent:
+        reports: list[Any] = []
+        topics.DIAGNOSTICS.subscribe_from(node, lambda message: reports.append(message.status[0]))
+        until(lambda: any(f"no packet from a referee yet on UDP {port}" in report.message for report in reports))
+        assert all(report.level[0] == Level.OK for report in reports)
+        sent.send(b"RGme\x0b" + bytes(683))
+        until(lambda: reports[-1].level[0] == Level.ERROR)
+        assert reports[-1].message.startswith("the referee is not understood, packets refused: ")
+        assert "version is 11; expected one of: 7, 8" in reports[-1].message
+        sent.send(write(7, 3))
+        until(lambda: reports[-1].level[0] == Level.OK)
 
 
 def test_a_port_in_use_is_an_error_that_names_port_and_remedy() -> None:
