@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import importlib.util
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -30,6 +31,23 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> BadInputError:
     hint = f" Did you mean {' or '.join(near)}?" if near else ""
     names_shown = "" if near and len(names) > MOST_NAMES else f" Known: {', '.join(names) or 'none'}."
     return BadInputError(f"There is no {kind} {name!r}.{hint}{names_shown}")
+
+
+def require(library: str, extra: str) -> None:
+    """Refuse to begin without a library that not everyone needs.
+
+    Args:
+        library: Its name, as Python imports it.
+        extra: The project's extra that brings it.
+
+    Raises:
+        BadInputError: if it is not installed.
+    """
+    if importlib.util.find_spec(library) is None:
+        raise BadInputError(
+            f"This needs the library {library}, which is not installed. Install the project's extra `{extra}`: "
+            f"pip install -e '.[{extra}]'"
+        )
 
 
 def check_writable(path: Path, option: str) -> None:
