@@ -150,6 +150,6 @@ def serialized(type_name: str, text: str, **fields: Any) -> bytes:
 def _made(store: Typestore, type_name: str, fields: dict[str, Any]) -> Any:
     made = {}
     for field, (kind, detail) in store.fielddefs[type_name][1]:
-        value = fields[field] if field in fields else {}
+        value = fields.get(field, 0)  # rosbags puts a number into a message without fields
         made[field] = _made(store, detail, value) if kind == Nodetype.NAME else value
     return store.types[type_name](**made)

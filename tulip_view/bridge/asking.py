@@ -9,8 +9,6 @@ from rclpy.client import Client
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.serialization import deserialize_message, serialize_message
 
-from tulip_view.bridge.rules import ENCODING
-
 ANSWER = 10.0  # [s] of wall-clock time until an answer must be there
 
 
@@ -34,15 +32,13 @@ def ask(client: Client, request: Any) -> Any:
     return future.result()
 
 
-def ask_serialized(client: Client, encoding: str, request: bytes) -> bytes:
-    """Return the serialized answer to a serialized request.
+def ask_serialized(client: Client, request: bytes) -> bytes:
+    """Return the serialized answer (CDR) to a serialized request.
 
     Raises:
         NotServedError: if the request is no such message, or as for `ask`.
     """
     request_class = client.srv_type.Request
-    if encoding != ENCODING:
-        raise NotServedError(f"the encoding of the request is {encoding!r}; expected {ENCODING}")
     if request_class.get_fields_and_field_types():
         try:
             message = deserialize_message(request, request_class)

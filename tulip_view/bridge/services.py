@@ -50,4 +50,4 @@ class Services:
 
 
 def _answer(client: Client, request: ServiceRequest) -> bytes:
-    return ask_serialized(client, request.encoding, request.payload)
+    return ask_serialized(client, request.payload)
