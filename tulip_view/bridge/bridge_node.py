@@ -87,7 +87,10 @@ class BridgeNode(ComponentNode):
                 self._server.clear_session()  # viewers forget what was before time began anew
             self._stamp = stamp
             self._server.broadcast_time(stamp)
-        self._feeds.forward(self._stamp or time_ns())
+        now = self._stamp or time_ns()
+        if not self._stamp and not self._clock_topic.publishers():
+            self._server.broadcast_time(now)  # a viewer to which a clock was announced knows no other time
+        self._feeds.forward(now)
 
     def _look(self) -> None:
         """See what is new in the graph."""
@@ -106,11 +109,11 @@ class BridgeNode(ComponentNode):
 
     def on_advertise(self, source: Source, name: str, type_name: str, encoding: str) -> None:
         """See `viewers.Bridge`."""
-        self._refuse("refused publications", self._publications.begin(source, name, type_name, encoding))
+        self._publications.begin(source, name, type_name, encoding)
 
     def on_data(self, source: Source, data: bytes) -> None:
         """See `viewers.Bridge`."""
-        self._refuse("unreadable publications", self._publications.publish(source, data))
+        self._refuse("refused publications", self._publications.publish(source, data))
 
     def on_unadvertise(self, source: Source) -> None:
         """See `viewers.Bridge`."""

@@ -20,20 +20,22 @@ class Publications:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._publishers: dict[Source, Publisher] = {}
+        self._refusals: dict[Source, str] = {}
 
-    def begin(self, source: Source, name: str, type_name: str, encoding: str) -> str:
-        """Let a viewer publish; return why not, or ""."""
+    def begin(self, source: Source, name: str, type_name: str, encoding: str) -> None:
+        """A viewer may want to publish. Some announce what their buttons could publish: that alone is no fault."""
         refusal = why_not_publish(name, type_name, encoding)
-        if not refusal:
-            [topic] = [each for each in FROM_PEOPLE if is_called(name, each)]
-            self._publishers[source] = self._node.create_publisher(topic.message, name, topic.quality.profile())
-        return refusal
+        if refusal:
+            self._refusals[source] = refusal
+            return
+        [topic] = [each for each in FROM_PEOPLE if is_called(name, each)]
+        self._publishers[source] = self._node.create_publisher(topic.message, name, topic.quality.profile())
 
     def publish(self, source: Source, data: bytes) -> str:
-        """Publish a serialized message; return why not, or "". What was refused at the beginning is so silently."""
+        """Publish a serialized message; return why not, or ""."""
         publisher = self._publishers.get(source)
         if publisher is None:
-            return ""
+            return self._refusals.get(source, "messages on a channel that was not announced")
         try:  # a message that no listener can read would be an error in each of them
             message = deserialize_message(data, publisher.msg_type)
         except rclpy_implementation.RMWError:
@@ -43,6 +45,7 @@ class Publications:
 
     def end(self, source: Source) -> None:
         """A viewer publishes no more."""
+        self._refusals.pop(source, None)
         publisher = self._publishers.pop(source, None)
         if publisher is not None:
             self._node.destroy_publisher(publisher)

@@ -26,14 +26,14 @@ def why_not_publish(name: str, type_name: str, encoding: str) -> str:
 
     Args:
         name: Full name, as in /striker/user_wish.
-        type_name: As in tulip_msgs/msg/UserCommand.
+        type_name: As in tulip_msgs/msg/UserCommand; some viewers leave out the part between.
         encoding: How the messages would be serialized.
     """
     topic = next((each for each in topics.FROM_PEOPLE if is_called(name, each)), None)
     if topic is None:
         open_ones = " and ".join(each.name for each in topics.FROM_PEOPLE)
         return f"{name} is not for viewers to publish; only {open_ones} are. For the rest there are services."
-    if type_name != topic.type_name:
+    if type_name not in (topic.type_name, topic.type_name.replace("/msg/", "/")):
         return f"the type of {name} is {type_name}; expected {topic.type_name}"
     if encoding != ENCODING:
         return f"the encoding of {name} is {encoding}; expected {ENCODING}"
