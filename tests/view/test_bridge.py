@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from foxglove_viewer import Viewer, serialized
+from foxglove_viewer import Viewer, free_port, serialized
 from mcap_ros2._dynamic import generate_dynamic
 from rosbags.typesys import get_types_from_msg
 from rosgraph_msgs.msg import Clock
@@ -57,12 +57,6 @@ class Graph(NamedTuple):
     def viewer(self, **options: Any) -> Iterator[Viewer]:
         with Viewer(self.port, self.spin, **options) as viewer:
             yield viewer
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @contextmanager

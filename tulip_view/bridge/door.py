@@ -17,9 +17,9 @@ from typing import Any
 from tulip_ros.errors import BadInputError
 from tulip_view.bridge.handshake import END, RefusedError, admit, answered
 
-LONGEST_HEAD = 16384  # [B] of a request that a browser makes
+LONGEST_HEAD = 16384  # [B] of a request; a browser's has some hundred
 PATIENCE = 10.0  # [s] for the head of a request
-CHUNK = 65536  # [B] passed on at once
+CHUNK = 262144  # [B] passed on at once
 
 
 class Door:
@@ -65,7 +65,8 @@ class Door:
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
-        listener = self._loop.run_until_complete(asyncio.start_server(self._let_in, sock=self._socket, limit=CHUNK))
+        opening = asyncio.start_server(self._let_in, sock=self._socket, limit=LONGEST_HEAD)
+        listener = self._loop.run_until_complete(opening)
         self._loop.run_forever()
         listener.close()
         tasks = asyncio.all_tasks(self._loop)
@@ -78,19 +79,14 @@ class Door:
         """Serve one connection; one that goes away in the middle is no error."""
         with contextlib.suppress(OSError, asyncio.IncompleteReadError, TimeoutError, asyncio.CancelledError):
             try:
-                head = await asyncio.wait_for(reader.readuntil(END), PATIENCE)
-                if len(head) > LONGEST_HEAD:
-                    raise RefusedError(HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE, f"The head is {len(head)} bytes.")
-                admission = admit(head, self._origins)
-            except asyncio.LimitOverrunError:
-                pass  # no browser sends so much
+                admission = admit(await _head(reader), self._origins)
             except RefusedError as refusal:
                 writer.write(refusal.answer())
                 await writer.drain()
                 if refusal.status is not HTTPStatus.UPGRADE_REQUIRED:  # a person who just looks
                     self._say(f"connection from {writer.get_extra_info('peername')[0]} refused: {refusal}")
             else:
-                server_reader, server_writer = await asyncio.open_connection(*self._server)
+                server_reader, server_writer = await asyncio.open_connection(*self._server, limit=CHUNK)
                 try:
                     server_writer.write(admission.request)
                     writer.write(answered(await server_reader.readuntil(END), admission.name))
@@ -98,6 +94,14 @@ class Door:
                 finally:
                     server_writer.close()
         writer.close()
+
+
+async def _head(reader: asyncio.StreamReader) -> bytes:
+    try:
+        return await asyncio.wait_for(reader.readuntil(END), PATIENCE)
+    except asyncio.LimitOverrunError as error:
+        words = f"The head of the request is too long; expected at most {LONGEST_HEAD} bytes."
+        raise RefusedError(HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE, words) from error
 
 
 async def _pass_on(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -86,4 +86,6 @@ class NodeSettings:
 
 
 def _parameter(node: str, name: str, value: Any) -> Parameter:
+    if isinstance(value, list) and value and isinstance(value[0], bytes):  # as ROS has single bytes
+        value = b"".join(value)
     return Parameter(f"{node}.{name}", value=value)
