@@ -101,10 +101,11 @@ def until(holds: Callable[[], Any]) -> None:
 
 def test_robot_curves_camera_and_health_show(browser: Any, pictures: Path, page_address: str, bridge_port: int):
     page = browser.new_page(viewport={"width": 1500, "height": 860})
+    page.set_default_timeout(PATIENCE)
     page.goto(f"{page_address}/?ds=foxglove-websocket&ds.url=ws://localhost:{bridge_port}&layoutId=tulip")
     for node in ("driver", "vision", "worldmodel", "motion", "strategy"):
-        page.get_by_text(f"/: {node}").wait_for(timeout=PATIENCE)
-    page.get_by_text("running").first.wait_for(timeout=PATIENCE)
+        page.get_by_text(f"/: {node}").wait_for()
+    page.get_by_text("running").first.wait_for()
     marker = ((85, 150, 80), (95, 255, 255))  # cyan, of the chest
     turf = ((40, 80, 40), (75, 255, 255))
     until(lambda: share(canvases(page)[0], *marker) > 0.001)

@@ -54,26 +54,22 @@ class Door:
                 "Is a bridge running already? End it, or choose another port with --port."
             ) from error
         self.port: int = self._socket.getsockname()[1]
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._run, name="door", daemon=True)
+        self._opened = threading.Event()
+        self._thread = threading.Thread(target=asyncio.run, args=(self._serve(),), name="door", daemon=True)
         self._thread.start()
+        self._opened.wait()
 
     def close(self) -> None:
         """Close it, and every connection through it."""
-        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._loop.call_soon_threadsafe(self._closing.set)
         self._thread.join()
 
-    def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        opening = asyncio.start_server(self._let_in, sock=self._socket, limit=LONGEST_HEAD)
-        listener = self._loop.run_until_complete(opening)
-        self._loop.run_forever()
-        listener.close()
-        tasks = asyncio.all_tasks(self._loop)
-        for task in tasks:
-            task.cancel()
-        self._loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
-        self._loop.close()
+    async def _serve(self) -> None:
+        self._loop, self._closing = asyncio.get_running_loop(), asyncio.Event()
+        listener = await asyncio.start_server(self._let_in, sock=self._socket, limit=LONGEST_HEAD)
+        self._opened.set()
+        await self._closing.wait()
+        listener.close()  # connections end with this coroutine
 
     async def _let_in(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Serve one connection; one that goes away in the middle is no error."""
