@@ -67,7 +67,7 @@ class Viewer:
             if found:
                 return found
             self._spin(0.05)
-        raise AssertionError(f"it did not come to hold; told {self.told[-3:]}")
+        raise AssertionError(f"it did not come to hold; last told {str(self.told[-1:])[:400]}")
 
     def _read(self) -> None:
         while True:

@@ -81,7 +81,7 @@ def graph(module_ros_domain: int) -> Iterator[Graph]:
     ):
         for _ in range(600):
             with socket.socket() as probe:
-                if probe.connect_ex(("127.0.0.1", port)) == 0:
+                if node.commands and probe.connect_ex(("127.0.0.1", port)) == 0:
                     break
             spin(0.05)
         yield Graph(port, node, spin)

@@ -9,8 +9,7 @@ from queue import Empty, SimpleQueue
 from time import time_ns
 
 import foxglove
-from foxglove import Parameter, StatusLevel
-from foxglove.websocket import Capability
+from foxglove.websocket import Capability, Parameter, StatusLevel
 
 from tulip_ros import topics
 from tulip_ros.raw_topic import RawTopic

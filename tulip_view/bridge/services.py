@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from foxglove import MessageSchema, Schema, Service, ServiceRequest, ServiceSchema
-from foxglove.websocket import WebSocketServer
+from foxglove import Schema
+from foxglove.websocket import MessageSchema, Service, ServiceRequest, ServiceSchema, WebSocketServer
 from rclpy.client import Client
 from rclpy.node import Node
 

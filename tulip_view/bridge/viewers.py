@@ -6,8 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Protocol
 
-from foxglove import Parameter
-from foxglove.websocket import ChannelView, Client, ClientChannel, ServerListener
+from foxglove.websocket import ChannelView, Client, ClientChannel, Parameter, ServerListener
 
 from tulip_view.bridge.node_settings import Answer, NodeSettings
 from tulip_view.bridge.publications import Source
