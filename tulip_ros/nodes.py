@@ -50,6 +50,7 @@ NODES: dict[str, NodeEntry] = {
         NodeEntry("game_input", "tulip_strategy.game_input_node"),
         NodeEntry("user_input", "tulip_strategy.user_input_node"),
         NodeEntry("perception", "tulip_sim.perception_node", playing=False),
+        NodeEntry("identify", "tulip_motion.identification.identify_node", playing=False),
         NodeEntry("recorder", "tulip_ros.recorder_node", playing=False),
         NodeEntry("replay", "tulip_ros.replay_node", playing=False),
         NodeEntry("bridge", "tulip_view.bridge.bridge_node", playing=False),
