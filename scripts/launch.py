@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 import _environment
 
 if __name__ == "__main__":
-    import sys
-
-    _environment.prepare(("view",) if "--view" in sys.argv else ())
+    _environment.prepare([name for name in ("view", "bridge") if f"--{name}" in sys.argv])
 
 import signal
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -19,7 +18,7 @@ from rich.console import Console
 from rich.live import Live
 
 from tulip_ros import plan
-from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, unknown
+from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, require, unknown
 from tulip_ros.launch import Launcher
 from tulip_ros.log_file import Log
 from tulip_ros.monitor import Monitor
@@ -40,6 +39,7 @@ def main(
     parameters: Annotated[list[Path] | None, typer.Option(help="YAML file `node: {name: value}`; repeatable.")] = None,
     log: Annotated[Path | None, typer.Option(help="Recording that driver 'log' plays back.")] = None,
     record: Annotated[Path | None, typer.Option(help="Record all topics into this new folder.")] = None,
+    bridge: Annotated[bool, typer.Option("--bridge", help="Also the bridge to Foxglove, for this machine.")] = False,
     transport: Annotated[str, typer.Option(help="auto, shared_memory or udp")] = "auto",
     logs: Annotated[Path | None, typer.Option(help="Folder for one log file a node.")] = None,
     view: Annotated[bool, typer.Option("--view", help="Open a page to watch and steer in a browser.")] = False,
@@ -49,7 +49,9 @@ def main(
     try:
         if transport not in TRANSPORTS:
             raise unknown("transport", transport, TRANSPORTS)
-        names = list(nodes or ROBOT) + (["recorder"] if record else [])
+        names = list(nodes or ROBOT) + (["recorder"] if record else []) + (["bridge"] if bridge else [])
+        if "bridge" in names:
+            require("foxglove", "bridge")
         values = {"recorder": {"path": str(record.absolute())}} if record else {}
         if log is not None:
             if driver != "log":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+from collections.abc import Iterator
 
 import pytest
 
@@ -20,11 +21,22 @@ def _is_free(domain: int) -> bool:
     return True
 
 
+def _enter_free_domain(patch: pytest.MonkeyPatch) -> int:
+    first = int(os.environ.get("ROS_DOMAIN_ID", os.getpid() % DOMAINS))
+    domain = next(each % DOMAINS for each in range(first, first + DOMAINS) if _is_free(each % DOMAINS))
+    patch.setenv("ROS_DOMAIN_ID", str(domain))
+    patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    return domain
+
+
 @pytest.fixture
 def ros_domain(monkeypatch: pytest.MonkeyPatch) -> int:
     """A ROS domain that nobody uses, set for this process and its children; traffic stays on this machine."""
-    first = int(os.environ.get("ROS_DOMAIN_ID", os.getpid() % DOMAINS))
-    domain = next(each % DOMAINS for each in range(first, first + DOMAINS) if _is_free(each % DOMAINS))
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    return domain
+    return _enter_free_domain(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def module_ros_domain() -> Iterator[int]:
+    """The same, for all tests of a module."""
+    with pytest.MonkeyPatch.context() as patch:
+        yield _enter_free_domain(patch)

@@ -10,6 +10,7 @@ from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 
+AGAIN = 10  # looks, five seconds, without an answer after which the question was lost and is asked again
 PATIENCE = 240  # looks, two minutes, that a node has to start and to answer; then it is asked no more
 
 Told = Callable[[str, dict[str, Any]], None]
@@ -47,6 +48,7 @@ class _Question:
         self._names: list[str] | None = None
         self._waiting: Any = None  # future
         self._looks = 0
+        self._asked_at = 0  # look
 
     def look(self) -> None:
         """Go on where the answer before is in."""
@@ -55,14 +57,14 @@ class _Question:
         self._looks += 1
         if self._looks > PATIENCE:
             self.forget()
-        elif self._waiting is None:
+        elif self._waiting is None or self._looks - self._asked_at > AGAIN:
             if self._list.service_is_ready() and self._get.service_is_ready():
-                self._waiting = self._list.call_async(ListParameters.Request())
+                self._ask()
         elif self._waiting.done():
             answer = self._waiting.result()
             if self._names is None:
                 self._names = list(answer.result.names)
-                self._waiting = self._get.call_async(GetParameters.Request(names=self._names))
+                self._ask()
             else:
                 values = {
                     name: _plain(parameter_value_to_python(value))
@@ -70,6 +72,14 @@ class _Question:
                 }
                 self.forget()
                 self._told(self._name, values)
+
+    def _ask(self) -> None:
+        assert self._list is not None and self._get is not None
+        self._asked_at = self._looks
+        if self._names is None:
+            self._waiting = self._list.call_async(ListParameters.Request())
+        else:
+            self._waiting = self._get.call_async(GetParameters.Request(names=self._names))
 
     def forget(self) -> None:
         """Ask no more."""

@@ -59,6 +59,7 @@ NODES: dict[str, NodeEntry] = {
         NodeEntry("recorder", "tulip_ros.recorder_node", playing=False),
         NodeEntry("replay", "tulip_ros.replay_node", playing=False),
         NodeEntry("view", "tulip_view.live.view_node", playing=False),
+        NodeEntry("bridge", "tulip_view.bridge.bridge_node", playing=False),
     )
 }
 """All nodes but the driver, by name."""

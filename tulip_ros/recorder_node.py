@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.type_support import check_is_valid_msg_type
+from rclpy.node import Node
+from rclpy.qos import ReliabilityPolicy
 
 from tulip_ros import log_notes, parameters, schemas, topics
 from tulip_ros.bag import FREE, Bag, Split
@@ -21,14 +20,13 @@ from tulip_ros.lost_messages import LostMessages
 from tulip_ros.mcap_file import COMPRESSIONS
 from tulip_ros.node_parameters import ParameterAsker
 from tulip_ros.picture_rate import PICTURE_RATE, PictureRate
+from tulip_ros.raw_topic import HIDDEN, RawTopic, Taken, message_topics, offered
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.serialized import time_at
 from tulip_ros.topics import Quality
 
 LOOK = 0.5  # [s] between two looks for new topics and nodes, and at the disk
 COLLECT = 0.02  # [s] between two times that waiting messages are taken: one waking for many is cheap
-WAITING = 200  # messages of one topic that wait while the recorder is busy: 0.8 s at 250 Hz
-HIDDEN = re.compile(r"(^|/)_|^/parameter_events$")
 PICTURES = {
     "compressed": (r"/(.*/)?camera/image_raw", r"/(.*/)?vision/picture"),
     "raw": (r"/(.*/)?camera/image_raw/compressed",),
@@ -107,36 +105,19 @@ class RecorderParameters:
         return included and not excluded and not HIDDEN.search(name)
 
 
-@dataclass
-class _Input:
-    """One subscription."""
+class _Input(RawTopic):
+    """One subscription, and what is known of its messages."""
 
-    name: str
-    type_name: str
-    quality: Quality
-    message_class: type[Any]
-    subscription: Any
-    is_picture: bool
-    numbers: LostMessages = field(default_factory=LostMessages)
-
-    def take(self) -> Iterable[tuple[int, int, _Input, bytes, int]]:
-        """Yield what came in since the last time: when, when it was sent [ns since 1970], from here, data, number."""
-        subscription, message_class = self.subscription, self.message_class
-        for _ in range(WAITING):
-            taken = subscription.take_message(message_class, True)
-            if taken is None:
-                return
-            data, about = taken
-            sent = about["source_timestamp"]
-            # A clock that another machine has set is no reason to refuse a message.
-            yield about["received_timestamp"] or time.time_ns(), sent, self, data, about["publication_sequence_number"]
+    def __init__(self, node: Node, name: str, type_name: str, quality: Quality, reliability: ReliabilityPolicy) -> None:
+        super().__init__(node, name, type_name, quality, reliability)
+        self.is_picture = PICTURE.fullmatch(name) is not None
+        self.numbers = LostMessages()
 
 
 class RecorderNode(ComponentNode):
     """Takes serialized messages and writes them as they are.
 
-    Messages wait in the middleware until the node takes all of them at once. No executor knows of the subscriptions:
-    the quick one cannot tell a callback a message's number, which shows what was lost.
+    Messages wait in the middleware until the node takes all of them at once; their numbers show what was lost.
     """
 
     def __init__(self, settings: RecorderParameters | None = None, namespace: str = "") -> None:
@@ -157,7 +138,7 @@ class RecorderNode(ComponentNode):
             self.get_fully_qualified_name(): parameters.plain(self.settings),
         }
         """Parameters of nodes."""
-        self._latched: dict[str, tuple[_Input, bytes, int]] = {}  # last message of each latched topic, and when sent
+        self._latched: dict[str, tuple[_Input, Taken]] = {}  # last message of each latched topic
         self._refused: set[str] = set()
         self._asker = ParameterAsker(self, self.learn)
         # The topics of this project are subscribed before anyone publishes, so that no first message is lost.
@@ -201,7 +182,7 @@ class RecorderNode(ComponentNode):
             ) from error
         self.bag, self.lost = bag, {}
         now = time.time_ns()  # a recording that begins later begins with what holds then
-        self.write([(now, sent, source, data, 0) for source, data, sent in self._latched.values()])
+        self.write([(source, message._replace(received=now)) for source, message in self._latched.values()])
         self.get_logger().info(f"recording to {self.bag.path}")
         return self.bag.path
 
@@ -235,30 +216,30 @@ class RecorderNode(ComponentNode):
             except OSError as error:
                 self.give_up(error)
 
-    def take(self) -> list[tuple[int, int, _Input, bytes, int]]:
+    def take(self) -> list[tuple[_Input, Taken]]:
         """Take all messages that wait, in the order in which they came."""
-        messages = [message for each in self.inputs.values() for message in each.take()]
-        messages.sort(key=lambda message: message[0])
-        for _, sent, source, data, number in messages:
+        messages = [(each, message) for each in self.inputs.values() for message in each.take()]
+        messages.sort(key=lambda pair: pair[1].received)
+        for source, message in messages:
             if source.quality.latched:
-                self._latched[source.name] = (source, data, sent)
-            missing = source.numbers.see(number, source.subscription.get_publisher_count)
+                self._latched[source.name] = (source, message)
+            missing = source.numbers.see(message.number, source.publishers)
             if missing:
                 self.lost[source.name] = self.lost.get(source.name, 0) + missing
                 self.health.count("lost messages", f"{missing} messages of {source.name} did not arrive", missing)
         return messages
 
-    def write(self, messages: Iterable[tuple[int, int, _Input, bytes, int]]) -> None:
+    def write(self, messages: Iterable[tuple[_Input, Taken]]) -> None:
         """Write messages that were taken."""
         bag = self.bag
         if bag is None:
             return
         try:
-            for received, sent, source, data, _ in messages:
-                if source.is_picture and not self._rate.keeps(source.name, time_at(data)):
+            for source, message in messages:
+                if source.is_picture and not self._rate.keeps(source.name, time_at(message.data)):
                     continue
                 bag.add_topic(source.name, source.type_name, source.quality)
-                bag.write(source.name, data, received, sent)
+                bag.write(source.name, message.data, message.received, message.sent)
         except OSError as error:
             self.give_up(error)
 
@@ -273,9 +254,9 @@ class RecorderNode(ComponentNode):
 
     def discover(self) -> None:
         """Subscribe to topics that appeared, ask nodes that appeared, and look after the disk."""
-        for name, types in self.get_topic_names_and_types():
-            if name not in self.inputs and len(types) == 1 and "/msg/" in types[0]:
-                self.subscribe(name, types[0], *self.offered(name))
+        for name, type_name in message_topics(self):
+            if name not in self.inputs:
+                self.subscribe(name, type_name, *offered(self, name))
         self._asker.look()
         if self.bag is None:
             return
@@ -285,38 +266,16 @@ class RecorderNode(ComponentNode):
         except OSError as error:
             self.give_up(error)
 
-    def offered(self, name: str) -> tuple[Quality, ReliabilityPolicy]:
-        """Return the quality that all publishers of a topic can serve."""
-        profiles = [each.qos_profile for each in self.get_publishers_info_by_topic(name)]
-        latched = bool(profiles) and all(each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in profiles)
-        reliable = all(each.reliability == ReliabilityPolicy.RELIABLE for each in profiles)
-        return Quality(WAITING, latched), ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
-
     def subscribe(self, name: str, type_name: str, quality: Quality, reliability: ReliabilityPolicy) -> None:
         """Record a topic from now on, if it is wanted and its type is known."""
         if name in self.inputs or name in self._refused or not self.settings.wants(name):
             return
         try:
-            message_class = schemas.message_class(type_name)
             schemas.definition(type_name)
+            self.inputs[name] = _Input(self, name, type_name, quality, reliability)
         except LookupError as error:
             self._refused.add(name)
             self.health.count("topics of unknown type", f"topic {name} is not recorded: {error}")
-            return
-        profile = QoSProfile(
-            history=HistoryPolicy.KEEP_LAST,
-            depth=WAITING,
-            reliability=reliability,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL if quality.latched else DurabilityPolicy.VOLATILE,
-        )
-        check_is_valid_msg_type(message_class)  # loads what the middleware needs to know of the type
-        with self.handle:
-            subscription = rclpy_implementation.Subscription(
-                self.handle, message_class, name, profile.get_c_qos_profile()
-            )
-        self.inputs[name] = _Input(
-            name, type_name, quality, message_class, subscription, PICTURE.fullmatch(name) is not None
-        )
 
     def give_up(self, error: OSError) -> None:
         """End a recording that cannot go on; what reached the disk is kept."""
@@ -360,7 +319,7 @@ class RecorderNode(ComponentNode):
                 told = f"error: the recording could not be ended: {error.strerror or error}"
             print(told, flush=True)  # ROS may have ended, and its log with it
         for each in self.inputs.values():
-            each.subscription.destroy_when_not_in_use()
+            each.close()
         self.inputs.clear()
         super().destroy_node()
 

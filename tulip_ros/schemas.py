@@ -39,7 +39,24 @@ def definition(type_name: str) -> str:
     Raises:
         LookupError: if the text of a definition is not installed.
     """
-    text = _text(type_name)
+    return _with_parts(_text(type_name), type_name)
+
+
+@cache
+def service_definitions(type_name: str) -> tuple[str, str]:
+    """Return the definitions of a service's request and response, each as `definition` returns a message's.
+
+    Args:
+        type_name: As in "std_srvs/srv/Trigger".
+
+    Raises:
+        LookupError: if the text of a definition is not installed.
+    """
+    request, _, response = _text(type_name).partition("---\n")
+    return _with_parts(request, type_name), _with_parts(response, type_name)
+
+
+def _with_parts(text: str, type_name: str) -> str:
     parts, seen, waiting = [text], {type_name}, _parts_of(text, type_name)
     while waiting:
         part = waiting.pop(0)
@@ -57,7 +74,7 @@ def _text(type_name: str) -> str:
     prefixes = [*filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)), sys.prefix]
     package, kind, name = type_name.split("/")
     for prefix in prefixes:
-        path = Path(prefix) / "share" / package / kind / f"{name}.msg"
+        path = Path(prefix) / "share" / package / kind / f"{name}.{kind}"
         if path.exists():
             text = path.read_text()
             return text if text.endswith("\n") else text + "\n"

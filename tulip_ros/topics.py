@@ -262,6 +262,14 @@ ROBOT_POSE = Topic(
     "robot_pose", PoseWithCovarianceStamped, STATE, ("worldmodel",), (), "base_footprint in map, for standard viewers"
 )
 TF = Topic("tf", TFMessage, EVENTS, ("worldmodel", "motion"), (), "map to odom; odom to base_footprint to base_link")
+USER_WISH = Topic(
+    "user_wish",
+    UserCommand,
+    STATE,
+    (),
+    ("user_input",),
+    "what a person wants, from viewers that publish; checked as set_user_command, stamp and sequence are not read",
+)
 GAME_STATE = Topic("game_state", GameState, LATCHED, ("game_input",), ("strategy",), "the referee's view of the game")
 USER_COMMAND = Topic("user_command", UserCommand, LATCHED, ("user_input",), ("strategy",), "the user's last wish")
 WALK_COMMAND = Topic(
@@ -360,6 +368,7 @@ TOPICS: tuple[Topic, ...] = (
     ROBOT_POSE,
     TF,
     GAME_STATE,
+    USER_WISH,
     USER_COMMAND,
     WALK_COMMAND,
     HEAD_COMMAND,
@@ -375,6 +384,9 @@ TOPICS: tuple[Topic, ...] = (
     GROUND_TRUTH,
     CLOCK,
 )
+
+FROM_PEOPLE: tuple[Topic, ...] = (USER_WISH, START_POSE)
+"""Topics that a person's viewer may publish; all others belong to the nodes."""
 
 RESET = Service("simulation/reset", Reset, "driver", "begin anew with a scenario and a seed")
 PLACE_BALL = Service("simulation/place_ball", PlaceBall, "driver", "put the ball somewhere")
@@ -411,6 +423,11 @@ SERVICES: tuple[Service, ...] = (
     ABORT_IDENTIFICATION,
     KICK,
 )
+
+
+def is_called(name: str, entry: Topic | Service) -> bool:
+    """Return whether a full name, as in /striker/odometry, is that of a topic or service in some namespace."""
+    return name == entry.name or name.endswith(f"/{entry.name.lstrip('/')}")
 
 
 def published_by(node_name: str) -> Iterator[Topic]:

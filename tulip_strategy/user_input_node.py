@@ -35,6 +35,7 @@ class UserInputNode(ComponentNode):
         self._command = self.sender(topics.USER_COMMAND)
         self.begin_anew()
         self.follow_clock()
+        self.listen(topics.USER_WISH, self._on_published_wish)
         self.create_service(topics.SET_USER_COMMAND.type, topics.SET_USER_COMMAND.name, self._on_wish)
         for service, request in TRIGGERS.items():
             self.create_service(service.type, service.name, self._trigger(request))
@@ -48,11 +49,14 @@ class UserInputNode(ComponentNode):
         self._publish()
 
     def _on_wish(self, request: Any, response: Any) -> Any:
-        forward, left, turning = (float(value) for value in request.velocity)
-        refusal = self._input.ask(
-            self._now(), request.request, request.strategy, (forward, left, turning), request.argument
-        )
-        return self._answer(refusal, response)
+        return self._answer(self._ask(request), response)
+
+    def _on_published_wish(self, message: Any) -> None:
+        self._settle(self._ask(message))
+
+    def _ask(self, wish: Any) -> str:
+        forward, left, turning = (float(value) for value in wish.velocity)
+        return self._input.ask(self._now(), wish.request, wish.strategy, (forward, left, turning), wish.argument)
 
     def _trigger(self, wish: UserRequest) -> Any:
         return lambda _, response: self._answer(self._input.ask(self._now(), wish), response)
@@ -60,12 +64,16 @@ class UserInputNode(ComponentNode):
     def _answer(self, refusal: str, response: Any) -> Any:
         response.success = not refusal
         response.message = refusal
+        self._settle(refusal)
+        return response
+
+    def _settle(self, refusal: str) -> None:
+        """Publish the wish that holds now, or tell why the new one was refused."""
         if refusal:
             self.health.count("refused wishes", f"refused: {refusal}")
         else:
             self.health.count("wishes")
             self._publish()
-        return response
 
     def _publish(self) -> None:
         self._command.publish(user_command_to_message(self._input.command))

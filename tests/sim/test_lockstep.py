@@ -37,6 +37,7 @@ NOT_IN_LOCKSTEP = {
     topics.CLOCK,
     topics.START_POSE,  # in matches alone
     topics.REPORT,
+    topics.USER_WISH,  # nobody is there to wish
 }
 
 

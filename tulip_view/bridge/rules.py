@@ -1,0 +1,40 @@
+"""What a viewer may see, call and publish."""
+
+from __future__ import annotations
+
+from tulip_ros import topics
+from tulip_ros.topics import Service, is_called
+
+ENCODING = "cdr"
+"""How messages are serialized, in both directions."""
+DEFINITIONS = "ros2msg"
+"""How their types are described."""
+
+
+def known_service(name: str, type_name: str) -> Service | None:
+    """Return which of this project's services that is, in whichever namespace; None: viewers are not offered it.
+
+    Args:
+        name: Full name, as in /striker/start.
+        type_name: As in std_srvs/srv/Trigger.
+    """
+    return next((each for each in topics.SERVICES if each.type_name == type_name and is_called(name, each)), None)
+
+
+def why_not_publish(name: str, type_name: str, encoding: str) -> str:
+    """Return why a viewer may not publish on a topic, or "" if it may.
+
+    Args:
+        name: Full name, as in /striker/user_wish.
+        type_name: As in tulip_msgs/msg/UserCommand; some viewers leave out the part between.
+        encoding: How the messages would be serialized.
+    """
+    topic = next((each for each in topics.FROM_PEOPLE if is_called(name, each)), None)
+    if topic is None:
+        open_ones = " and ".join(each.name for each in topics.FROM_PEOPLE)
+        return f"{name} is not for viewers to publish; only {open_ones} are. For the rest there are services."
+    if type_name not in (topic.type_name, topic.type_name.replace("/msg/", "/")):
+        return f"the type of {name} is {type_name}; expected {topic.type_name}"
+    if encoding != ENCODING:
+        return f"the encoding of {name} is {encoding}; expected {ENCODING}"
+    return ""
