@@ -19,8 +19,8 @@ from tulip_description.planar import Pose2D
 from tulip_description.robot import JOINTS
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_description.short_numbers import fixed_point
-from tulip_motion.identification.progress import Progress
 from tulip_motion.footsteps import Footstep
+from tulip_motion.identification.progress import Progress
 from tulip_motion.interface import (
     HeadCommand,
     HeadMode,
