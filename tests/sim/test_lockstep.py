@@ -38,6 +38,9 @@ NOT_IN_LOCKSTEP = {
     topics.START_POSE,  # in matches alone
     topics.REPORT,
     topics.USER_WISH,  # nobody is there to wish
+    topics.DIAGNOSTICS_AGG,
+    topics.IDENTIFICATION,  # in the experiment alone
+    topics.MARKERS,
 }
 
 
