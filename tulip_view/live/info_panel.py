@@ -41,6 +41,7 @@ class InfoPanel:
         """
         self._scene, self._remarks = scene, remarks
         self._shown: tuple[str, float] | None = None
+        self._changes = 0
         self._plots_due = self._picture_due = 0.0
         gui = server.gui
         gui.main_panel.dock_right()
@@ -77,10 +78,7 @@ class InfoPanel:
         if now >= self._picture_due:
             self._picture_due = now + PICTURE
             self._draw_picture()
-            balance = self._scene.balance()
-            show(self._balance, balance is not None)
-            if balance is not None:
-                self._balance.image = balance_picture(balance)
+            self._draw_balance()
         if now >= self._plots_due:
             self._plots_due = now + PLOTS
             self._draw_plots()
@@ -124,6 +122,15 @@ class InfoPanel:
         if sight is not None:
             self._picture.image = sight.picture[:, :, ::-1]
         self._say(self._found, escape(f"{sight.stamp:.2f} s: {sight.words}") if sight is not None else "no picture")
+
+    def _draw_balance(self) -> None:
+        if self._scene.changes == self._changes:
+            return
+        self._changes = self._scene.changes
+        balance = self._scene.balance()
+        show(self._balance, balance is not None)
+        if balance is not None:
+            self._balance.image = balance_picture(balance)
 
     def _draw_plots(self) -> None:
         joint = JOINTS[self._joint.options.index(self._joint.value)]

@@ -19,7 +19,7 @@ from tulip_view.live.scene import Scene
 from tulip_view.recording import STEADY
 
 DEPTH = 30
-"""Messages of a fast topic that wait until the page is drawn next: 250 Hz for 0.12 s."""
+"""Messages of a topic that wait until the page is drawn next: 0.6 s of 50 Hz."""
 PICTURES: dict[str, Topic | None] = {
     "camera, with features": topics.CAMERA_COMPRESSED,
     "vision's own": topics.VISION_PICTURE,
@@ -32,7 +32,7 @@ class LiveFeed:
     """Looks after the topics whenever the page is drawn.
 
     The subscriptions belong to a node that no executor serves: messages wait in the middleware, where new ones push old
-    ones out, and are taken several at a time. That costs a tenth of a callback for each.
+    ones out, and are taken when the page is drawn, several at a time.
 
     Attributes:
         robot: Namespace of the robot that is shown.
@@ -70,17 +70,17 @@ class LiveFeed:
         Args:
             name: One of `PICTURES`.
         """
-        for full, (topic_name, _) in list(self._ears.items()):
-            topic = INPUTS[topic_name].topic
-            if topic.quality is topics.PICTURE and topic is not PICTURES[name]:
-                self._close(full)
-                self._scene.forget(topic)
-        self._picture = PICTURES[name]
+        self._picture = PICTURES[name]  # `update`, which another thread calls, ends the listening to the others
 
     def update(self) -> bool:
         """Take what has come since the last time; begin to listen if need be. Return False: time only goes on."""
         if not self._ears and not self.robot:
             self.robot = min(self._publishing(), default="", key=lambda name: (name != "", name != "striker", name))
+        for full, (name, _) in list(self._ears.items()):
+            topic = INPUTS[name].topic
+            if topic.quality is topics.PICTURE and topic is not self._picture:
+                self._close(full)
+                self._scene.forget(topic)
         for entry in INPUTS.values():
             if entry.topic.quality is topics.PICTURE and entry.topic is not self._picture:
                 continue

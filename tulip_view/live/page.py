@@ -100,6 +100,7 @@ class Page:
         asker.start()
         resting = False
         robots_due = 0.0
+        drawn: tuple[int, bool] | None = None
         while not self._stop.is_set():
             if not self._server.get_clients():
                 if not resting:
@@ -118,7 +119,10 @@ class Page:
                 self._show_robots()
             if self._source.update():
                 self.info.draw_all()
-            self._stage.draw(bool(self.info.ghost.value))
+            seen = (self._scene.changes, bool(self.info.ghost.value))
+            if seen != drawn:
+                drawn = seen
+                self._stage.draw(seen[1])
             self.info.draw()
             worked = time.monotonic() - begin
             self._pace.worked(worked)

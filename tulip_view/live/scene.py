@@ -93,6 +93,7 @@ class Scene:
 
     Attributes:
         body: Boxes of the robot's links.
+        changes: Grows with whatever changes what there is to see.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -106,11 +107,13 @@ class Scene:
         self._mount = load_mount()
         self._lock = RLock()
         self._buffers = Buffers()
+        self.changes = 0
 
     def begin_anew(self) -> None:
         """Forget all: time began anew, or another moment of a recording is looked at."""
         with self._lock:
             self._buffers = Buffers()
+            self.changes += 1
 
     def take(self, name: str, message: Any, arrival: float) -> None:
         """Take a message.
@@ -122,11 +125,13 @@ class Scene:
         """
         with self._lock:
             self._buffers.take(name, message, arrival)
+            self.changes += 1
 
     def forget(self, topic: topics.Topic) -> None:
         """Forget what came of a topic."""
         with self._lock:
             self._buffers.forget(topic)
+            self.changes += 1
 
     def told(self, tell: Callable[[Buffers], T]) -> T:
         """Return what a function makes of the messages; none comes in meanwhile."""

@@ -15,12 +15,14 @@ from tulip_ros.topics import Service
 from tulip_strategy.menu import Wish
 
 ANSWER = 5.0  # [s] of wall-clock time until a service must have answered
+FIND = 1.0  # [s] until it must have been found: a node that has just started is not known at once
+LOOK = 0.01  # [s] between two looks
 Tell = Callable[[str], None]
 """Is told what came of a wish, in words."""
 
 
 class UserCalls:
-    """Clients of user input, recorder and simulator. Calls return at once; what came of them is told later."""
+    """Clients of user input, recorder and simulator. Calls do not wait for answers, which are told when they come."""
 
     def __init__(self, node: Node, robot: str, tell: Tell) -> None:
         """Make the clients.
@@ -80,9 +82,12 @@ class UserCalls:
                 self._tell(f"{what}: no answer within {ANSWER:.0f} s; does the node still run?")
 
     def _ask(self, client: Client, request: Any, what: str, missing: str) -> None:
-        if not client.service_is_ready():
-            self._tell(f"{what}: {missing}")
-            return
+        end = time.monotonic() + FIND
+        while not client.service_is_ready():
+            if time.monotonic() > end:
+                self._tell(f"{what}: {missing}")
+                return
+            time.sleep(LOOK)
         future = client.call_async(request)
         self._waiting.append((time.monotonic() + ANSWER, what, client, future))
         future.add_done_callback(lambda done: self._answered(what, done))

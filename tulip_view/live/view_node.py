@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -65,6 +66,7 @@ class ViewNode(ComponentNode):
         self._ears = Node("view_inputs", enable_rosout=False, start_parameter_services=False)
         self._feed = LiveFeed(self._ears, self._scene, (p.robot or self.get_namespace()).strip("/"))
         self._calls: dict[str, UserCalls] = {}
+        self._calls_lock = threading.Lock()
         self._steer = SteerPanel(self._server, self._current_calls, self._heading)
         self._page = Page(self._server, self._scene, load_field(), self._feed)
         sources = self._page.info.sources
@@ -76,6 +78,7 @@ class ViewNode(ComponentNode):
         """Handle answers."""
         spin(LOOK)
         self._page.check()
+        self._current_calls()  # before a button is pressed: finding a service takes a moment
         for calls in tuple(self._calls.values()):
             calls.check()
 
@@ -88,9 +91,10 @@ class ViewNode(ComponentNode):
 
     def _current_calls(self) -> UserCalls:
         robot = self._feed.robot
-        if robot not in self._calls:
-            self._calls[robot] = UserCalls(self, robot, self._steer.tell)
-        return self._calls[robot]
+        with self._calls_lock:
+            if robot not in self._calls:
+                self._calls[robot] = UserCalls(self, robot, self._steer.tell)
+            return self._calls[robot]
 
     def _heading(self) -> float:
         pose = self._scene.around().pose
