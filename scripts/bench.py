@@ -25,7 +25,9 @@ from tulip_sim.bench import (
     challenges,
     clik,
     control,
+    dynamics,
     head,
+    identify,
     ilc,
     kick,
     latency,
@@ -35,6 +37,7 @@ from tulip_sim.bench import (
     odometry,
     push,
     referee,
+    simcheck,
     strategy,
     stress,
     vision,
@@ -44,7 +47,7 @@ from tulip_sim.bench.runner import Row, run, save, write_results
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress),
-    *(vision, localization, ball, head, latency, log),
+    *(simcheck, vision, localization, ball, head, latency, log, identify, dynamics),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"
@@ -77,7 +80,8 @@ def main(
 
         def done(row: Row) -> None:
             bar.advance(task)
-            console.print("  ".join(f"{key} {value}" for key, value in row.items()), highlight=False, soft_wrap=True)
+            figures = (f"{key} {value}" for key, value in row.items() if not isinstance(value, list | dict))
+            console.print("  ".join(figures), highlight=False, soft_wrap=True, markup=False)
 
         rows = run(bench, workers, done)
     save(bench, rows, DOCS / "results")

@@ -1,4 +1,4 @@
-"""Make the pictures of the documents from a trial: the robot with ball and goal, and what its camera sees."""
+"""Make the pictures of the documents: a trial with ball and goal, what the camera sees, postures of the experiment."""
 
 from __future__ import annotations
 
@@ -19,9 +19,11 @@ from numpy.typing import NDArray
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.field import load_field
 from tulip_description.robot import load_robot
+from tulip_motion.identification.experiment_plan import make_plan
 from tulip_motion.interface import MotionMode, Support
 from tulip_sim.camera import CameraParameters, CameraRenderer
 from tulip_sim.lockstep import Lockstep
+from tulip_sim.posture_picture import posture_picture
 from tulip_sim.scenario import make_scenario
 from tulip_sim.spectator import Spectator, behind
 from tulip_sim.truth import Truth
@@ -38,6 +40,7 @@ SECOND = 10**9  # [ns]
 PERIOD = 20_000_000  # [ns] between two looks
 LONGEST = 160  # [s] of simulated time
 TRIALS = 20
+POSTURES = (1, 5, 6, 23, 27)  # of the identification experiment: they differ much
 
 Picture = NDArray[np.uint8]
 
@@ -92,7 +95,7 @@ def find_moment(seed: int, camera: HeadCamera) -> tuple[Truth, Picture] | None:
 
 def main(
     seed: Annotated[int, typer.Option(help="Of the first trial to look at; the next ones follow.", min=0)] = 2,
-    folder: Annotated[Path, typer.Option(help="Where match.png and camera.png go.")] = PICTURES,
+    folder: Annotated[Path, typer.Option(help="Where match.png, camera.png and postures.png go.")] = PICTURES,
 ) -> None:
     """Play trials in lockstep until robot, ball and goal make a picture."""
     camera = HeadCamera()
@@ -108,9 +111,16 @@ def main(
     field = load_field()
     view = Spectator(field, load_robot()).render(truth, behind(truth.footprint, field.opponent_goal))
     folder.mkdir(parents=True, exist_ok=True)
-    for name, picture in (("match.png", view), ("camera.png", seen)):
+    of_trial = f"seed {number}, {truth.stamp / SECOND:.2f} s"
+    postures = [visit.posture for plan in make_plan(load_robot()) for visit in plan.visits]
+    experiment = posture_picture(load_robot(), [postures[index] for index in POSTURES])
+    for name, picture, what in (
+        ("match.png", view, of_trial),
+        ("camera.png", seen, of_trial),
+        ("postures.png", experiment, f"postures {', '.join(str(index + 1) for index in POSTURES)}"),
+    ):
         cv2.imwrite(str(folder / name), picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])
-        print(f"wrote {folder / name}: seed {number}, {truth.stamp / SECOND:.2f} s")
+        print(f"wrote {folder / name}: {what}")
 
 
 if __name__ == "__main__":

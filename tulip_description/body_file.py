@@ -22,9 +22,9 @@ VERSION = 1
 HEAD = """\
 # Masses [kg], CoMs [m] in the links' frames, and principal moments about the CoMs [kg m^2] of a robot's links. They
 # take the place of those of robot.yaml: load_robot(body=...), and the parameter body_file of motion control.
-# Static postures tell the base parameters alone [m], by the whole mass, with their covariance [m^2]. How they are
-# shared among links is the most probable way beside robot.yaml; inertias are robot.yaml's, scaled by the masses.
-# See docs/identification.md."""
+# Static postures tell the base parameters alone [m], by the whole mass, with their covariance [m^2]; model_error [m] is
+# what they leave of each CoP. How they are shared among links is the most probable way beside robot.yaml; inertias are
+# robot.yaml's, scaled by the masses. See docs/identification.md."""
 
 
 class BodyFileError(ValueError):
@@ -57,6 +57,7 @@ class Body:
         base_names: The r combinations that were identified, in words.
         base_values: (r,) these, by the whole mass [m]; the last, the sum of masses, is 1.
         base_covariance: (r, r) [m^2].
+        model_error: What the fit left of each CoP beside the cells' noise, standard deviation [m].
     """
 
     variant: str
@@ -65,6 +66,7 @@ class Body:
     base_names: tuple[str, ...]
     base_values: Array
     base_covariance: Array
+    model_error: float
 
     def on(self, robot: Robot) -> Robot:
         """Return a robot with this body; kinematics, limits and shapes stay its own.
@@ -107,6 +109,7 @@ def write_body(path: Path, body: Body) -> None:
             {"value": value, "is": name} for name, value in zip(body.base_names, body.base_values.tolist(), strict=True)
         ],
         "base_covariance": body.base_covariance.tolist(),
+        "model_error": body.model_error,
     }
     text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=math.inf)
     try:
@@ -154,6 +157,9 @@ def _body(data: Any) -> Body:
     if not isinstance(base, list) or not isinstance(rows, list) or len(rows) != len(base):
         raise _WrongError("base_parameters and base_covariance are expected to be lists of one length")
     covariance = np.array([_numbers(row, len(base), "base_covariance") for row in rows]).reshape(len(base), len(base))
+    (model_error,) = _numbers([_get(data, "model_error", "the file")], 1, "model_error")
+    if model_error < 0.0:
+        raise _WrongError(f"model_error is {model_error} m; expected >= 0")
     rounding = 1e-9 * np.abs(covariance).max(initial=0.0)
     asymmetry = np.abs(covariance - covariance.T).max(initial=0.0)
     if asymmetry > rounding or np.linalg.eigvalsh(covariance).min(initial=0.0) < -rounding:
@@ -167,6 +173,7 @@ def _body(data: Any) -> Body:
             [_numbers([_get(entry, "value", "base_parameters")], 1, "base_parameters: value")[0] for entry in base]
         ),
         base_covariance=covariance,
+        model_error=model_error,
     )
 
 

@@ -23,7 +23,8 @@ class Sensors:
         stamp: When it was measured [ns].
         joint_positions: (14,) [rad], order of `tulip_description.robot.JOINTS`.
         joint_velocities: (14,) [rad/s].
-        joint_efforts: (14,) torque applied last [N m].
+        joint_efforts: (14,) torque of the motors, before the joints' friction: the mean since the last reading [N m].
+            A sample would come at the same instant of every command, whose torque falls while the joint follows it.
         imu_orientation: (4,) quaternion x, y, z, w of imu_link in a level frame; yaw drifts.
         imu_angular_velocity: (3,) of imu_link in imu_link [rad/s].
         imu_linear_acceleration: (3,) specific force in imu_link [m/s^2]; +g upwards at rest.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,6 +10,7 @@ from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry as OdometryMessage
 from numpy.typing import NDArray
 from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
 from tulip_description import frames
@@ -16,6 +18,7 @@ from tulip_description.planar import Pose2D
 from tulip_description.robot import JOINTS
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_description.short_numbers import fixed_point
+from tulip_motion.identification.progress import Progress
 from tulip_motion.interface import (
     HeadCommand,
     HeadMode,
@@ -265,3 +268,20 @@ def motion_state_from_message(message: MotionStateMessage) -> MotionState:
         notes=tuple(message.notes),
         **{name: np.array(getattr(message, name)) for name in _STATE_ARRAYS},
     )
+
+
+def progress_to_message(progress: Progress) -> String:
+    """Return how far the experiment has come, as JSON."""
+    return String(data=json.dumps(progress.as_dict()))
+
+
+def progress_from_message(message: String) -> Progress:
+    """Return how far the experiment has come.
+
+    Raises:
+        ValueError: if the message is no such progress.
+    """
+    values = json.loads(message.data)  # its error is a ValueError
+    if not isinstance(values, dict):
+        raise ValueError(f"progress of the experiment is {message.data!r}; expected a JSON object")
+    return Progress.from_dict(values)

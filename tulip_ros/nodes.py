@@ -55,6 +55,7 @@ NODES: dict[str, NodeEntry] = {
         NodeEntry("perception", "tulip_sim.perception_node", playing=False),
         NodeEntry(AGGREGATOR, "tulip_ros.aggregator_node", playing=False),
         NodeEntry("markers", "tulip_view.markers_node", playing=False),
+        NodeEntry("identify", "tulip_motion.identification.identify_node", playing=False),
         NodeEntry("recorder", "tulip_ros.recorder_node", playing=False),
         NodeEntry("replay", "tulip_ros.replay_node", playing=False),
     )

@@ -314,6 +314,14 @@ START_POSE = Topic(
 REPORT = Topic(
     "referee/report", String, LATCHED, ("driver",), (), "match of two robots: all that the referee has said, as JSON"
 )
+IDENTIFICATION = Topic(
+    "identification/progress",
+    String,
+    LATCHED,
+    ("identify",),
+    (),
+    "how far the experiment of `identify.py run` has come, and which readings count, as JSON",
+)
 GROUND_TRUTH = Topic(
     "ground_truth",
     GroundTruth,
@@ -354,6 +362,7 @@ TOPICS: tuple[Topic, ...] = (
     MARKERS,
     START_POSE,
     REPORT,
+    IDENTIFICATION,
     GROUND_TRUTH,
     CLOCK,
 )
@@ -371,6 +380,9 @@ STOP_RECORDING = Service("stop_recording", StopRecording, "recorder", "end the r
 PAUSE_REPLAY = Service("replay/pause", Trigger, "replay", "hold the replay; of the log driver, too")
 RESUME_REPLAY = Service("replay/resume", Trigger, "replay", "go on with the replay")
 STEP_REPLAY = Service("replay/step", Trigger, "replay", "hold the replay, and let one step of it pass")
+ABORT_IDENTIFICATION = Service(
+    "identification/abort", Trigger, "identify", "end the experiment: go home, put the foot down and stand"
+)
 KICK = Service("kick", Kick, "motion", "action: kick the ball once, from standing or by a step of the walk")
 
 SERVICES: tuple[Service, ...] = (
@@ -387,6 +399,7 @@ SERVICES: tuple[Service, ...] = (
     PAUSE_REPLAY,
     RESUME_REPLAY,
     STEP_REPLAY,
+    ABORT_IDENTIFICATION,
     KICK,
 )
 

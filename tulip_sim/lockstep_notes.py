@@ -7,6 +7,7 @@ from typing import Any
 
 from tulip_description.field import load_field
 from tulip_description.planar import Pose2D
+from tulip_motion.identification.experiment_settings import ExperimentSettings
 from tulip_ros import log_notes
 from tulip_ros.log_notes import Notebook
 from tulip_sim.lockstep import Settings
@@ -57,6 +58,27 @@ def explain_match(bag: Notebook, seed: int, settings: MatchSettings) -> None:
         _attach_robot(bag, f"{NAMESPACES[team]}/", settings.of_team(team), {**turned, **told}, turned)
     driver = {"striker": settings.striker, "keeper": settings.keeper, "rules": settings.rules}
     _attach_driver(bag, "driver", seed, settings.world, settings.of_team(0), driver)
+
+
+def explain_experiment(
+    bag: Notebook, seed: int, settings: ExperimentSettings, world: WorldParameters, secret: int | None
+) -> None:
+    """Note how the identification experiment is done.
+
+    Args:
+        bag: A recording that was begun.
+        seed: Of all noise.
+        settings: Of the experiment.
+        world: Physics and sensors.
+        secret: Seed of the body that the robot really has, or None for the one that it is believed to have.
+
+    Raises:
+        OSError: if the recording cannot be written.
+    """
+    body = {} if secret is None else {"secret_body": str(secret)}
+    log_notes.explain(bag, {**OWN, "seed": str(seed), "scenario": "identification", "robots": "1", **body})
+    log_notes.attach_settings(bag, "identify", settings)
+    log_notes.attach_settings(bag, "driver", None, seed=seed, camera=False, world=world)
 
 
 def _attach_robot(

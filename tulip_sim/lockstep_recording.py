@@ -18,6 +18,7 @@ from tulip_motion.messages import (
     joint_command_to_message,
     motion_state_to_message,
     odometry_to_message,
+    progress_to_message,
     sensors_to_messages,
     walk_command_to_message,
 )
@@ -112,6 +113,7 @@ class LockstepRecording:
             "behaviour_tree": lambda stamp, value: [(topics.BEHAVIOUR_TREE, tree_to_message(value))],
             "ground_truth": lambda stamp, value: [(topics.GROUND_TRUTH, truth_to_message(*value))],
             "initialpose": lambda stamp, value: [(topics.START_POSE, start_pose_to_message(value, stamp))],
+            "identification/progress": lambda stamp, value: [(topics.IDENTIFICATION, progress_to_message(value))],
             "referee/report": lambda stamp, value: [(topics.REPORT, report_to_message(value))],
         }
 

@@ -24,7 +24,8 @@ class BodyState:
 
     Attributes:
         stamp: [ns].
-        joint_positions, joint_velocities, joint_efforts: (n,) [rad], [rad/s], [N m].
+        joint_positions, joint_velocities: (n,) [rad], [rad/s].
+        joint_efforts: (n,) mean torque of the motors since the last reading [N m].
         base_position: (3,) of base_link [m].
         base_orientation: (4,) quaternion x, y, z, w of base_link.
         base_rotation: (3, 3) the same as a matrix.

@@ -33,6 +33,7 @@ class SimulatedRobot:
         body: Its number in the physics engine.
         index: The engine's number of each link and joint, by name.
         joint_positions, joint_velocities: (n,) after the last step of physics [rad], [rad/s].
+        dry_friction: (n,) of each joint, as drawn [N m].
     """
 
     def __init__(
@@ -74,10 +75,10 @@ class SimulatedRobot:
         self._foot_links = tuple(self.index[sole.link] for sole in robot.soles)
         self._com_in_base = np.array(body.links[0].com)
         n = len(self._joint_indices)
-        self._dry_friction = robot.effort_limits * physics_rng.uniform(*p.joint_friction, n)
+        self.dry_friction = robot.effort_limits * physics_rng.uniform(*p.joint_friction, n)
         self._place(pose)
         self._driver = JointDriver(robot, p.driver, start)
-        self._effort = np.zeros(n)
+        self._effort_sum, self._effort_count = np.zeros(n), 0
         self.joint_positions, self.joint_velocities = start.copy(), np.zeros(n)
         self._push_force, self._push_end = np.zeros(3), 0
         self._touches = {"left": TouchCounter(), "right": TouchCounter(), "body": TouchCounter()}
@@ -106,12 +107,14 @@ class SimulatedRobot:
 
     def drive(self, now: int) -> None:
         """Put the torques of the next millisecond on the joints, and a push on the trunk while there is one."""
-        self._effort = self._driver.torques(now, self.joint_positions, self.joint_velocities)
+        effort = self._driver.torques(now, self.joint_positions, self.joint_velocities)
+        self._effort_sum += effort
+        self._effort_count += 1
         pybullet.setJointMotorControlArray(
             self.body,
             self._joint_indices,
             pybullet.TORQUE_CONTROL,
-            forces=(self._effort - self._friction_torque()).tolist(),
+            forces=(effort - self._friction_torque()).tolist(),
             physicsClientId=self._client,
         )
         if now < self._push_end:
@@ -130,6 +133,7 @@ class SimulatedRobot:
         """Read the sensors if a reading is due at this millisecond."""
         if (now // MILLISECOND + self._delay) % self._parameters.sensors.period == 0:
             self._readings.append(self._sensors.measure(self._body_state(now)))
+            self._effort_sum[:], self._effort_count = 0.0, 0
 
     def sensors(self, now: int) -> Sensors:
         """Return the newest reading that has arrived by now."""
@@ -209,7 +213,7 @@ class SimulatedRobot:
             pybullet.resetJointState(self.body, index, float(angle), 0.0, physicsClientId=client)
 
     def _friction_torque(self) -> Array:
-        torque: Array = self._dry_friction * np.tanh(self.joint_velocities / self._parameters.joint_friction_speed)
+        torque: Array = self.dry_friction * np.tanh(self.joint_velocities / self._parameters.joint_friction_speed)
         return torque
 
     def _body_state(self, now: int) -> BodyState:
@@ -219,7 +223,7 @@ class SimulatedRobot:
             stamp=now,
             joint_positions=self.joint_positions,
             joint_velocities=self.joint_velocities,
-            joint_efforts=self._effort,
+            joint_efforts=self._effort_sum / max(self._effort_count, 1),
             base_position=position,
             base_orientation=orientation,
             base_rotation=rotation,

@@ -88,8 +88,9 @@ def test_whole_recording_of_a_trial_is_read_by_another_reader_and_computed_anew(
     }
     summary = play_graph(1, "open", tmp_path / "trial", values=values, referee_port=free_port(), logs=tmp_path)
     assert summary.outcome == "time"
-    not_here = (topics.START_POSE, topics.REPORT, topics.DIAGNOSTICS_AGG, topics.MARKERS)  # of matches and tools
-    kept = [topic for topic in topics.TOPICS if topic not in (topics.VISION_PICTURE, *not_here)]
+    of_matches = (topics.START_POSE, topics.REPORT)
+    of_tools = (topics.IDENTIFICATION, topics.DIAGNOSTICS_AGG, topics.MARKERS)
+    kept = [topic for topic in topics.TOPICS if topic not in (topics.VISION_PICTURE, *of_matches, *of_tools)]
     counts: dict[str, int] = {}
     with AnyReader([tmp_path / "trial"]) as reader:
         kinds = {each.topic: each.msgtype for each in reader.connections}

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from tulip_sim.bench import challenges, ilc, kick, push, strategy, stress, walk
+from tulip_sim.bench import challenges, ilc, kick, push, simcheck, strategy, stress, walk
 from tulip_sim.bench.runner import Bench, Row, run, save, write_results
 
-BENCHES = (strategy.BENCH, walk.BENCH, push.BENCH, kick.BENCH, ilc.BENCH, stress.BENCH)
+BENCHES = (strategy.BENCH, walk.BENCH, push.BENCH, kick.BENCH, ilc.BENCH, stress.BENCH, simcheck.BENCH)
 
 TRIAL_ROWS: list[Row] = [
     {

@@ -2,11 +2,13 @@
 
 Each posture j on foot s gives two numbers, the CoP. With eqs. (2b) and (2c) they are linear in the base parameters, of
 which the last, the sum of all masses, is 1. The IMU is mounted a little askew, by small angles beta about the x and y
-axes of base_link, the same in all postures; they move the point below the CoM by about c_z beta, 2 mm for 3 mrad, and
-are found along with the body:
+axes of base_link, the same in all postures; they move the point below the CoM by about c_z beta, 2 mm for 3 mrad. The
+cells do not show the CoP quite where it is: their places are known to a tenth of a millimetre at best, o_f on foot f,
+and what presses on the rim of the sole, outside of the cells, does not count as far out as it is: distances from the
+cells' middle m_f come out too short, by shares k. Both are found along with the body:
 
-    cop_j = A_j theta_b + N_j beta + e_j,    cov e_j = C_j + s^2 I                                            (2d)
-    beta ~ N(0, s_beta^2)
+    cop_j = A_j theta_b + N_j beta + o_f + diag(cop_j - m_f) k + e_j,    cov e_j = C_j + s^2 I                (2d)
+    beta ~ N(0, s_beta^2),    o_f ~ N(0, s_o^2),    k ~ N(0, s_k^2)
     N_j = -c_z d(sigma)/d(beta),    d(down)/d(beta) = -[down]x
 
 C_j comes from the cells' noise. s is what the model leaves over: encoders, mean attitude, soles that are not quite at
@@ -54,6 +56,8 @@ class IdentificationSettings:
     Attributes:
         spread: Of the bodies about the robot file: what is beyond plausible is refused.
         mount_spread: Standard deviation of the IMU's mounting angles [rad].
+        cop_spread: Standard deviation of what the places of a foot's cells do to its CoP, each axis [m].
+        rim_spread: Standard deviation of the share by which distances from the cells' middle come out wrong.
         largest_model_error: s at most [m]; more is no small imperfection.
         largest_uncertainty: Standard deviation of the CoM of any posture, root mean square, at most [m]; more means
             that the postures do not tell the body.
@@ -61,6 +65,8 @@ class IdentificationSettings:
 
     spread: Spread = field(default_factory=Spread)
     mount_spread: float = 0.003
+    cop_spread: float = 1e-4
+    rim_spread: float = 0.15
     largest_model_error: float = 1e-3
     largest_uncertainty: float = 2e-3
 
@@ -163,8 +169,8 @@ def identify_com(
         values=np.append(values[:unknown], 1.0),
         covariance=full,
         mass=mass,
-        mount=values[unknown:],
-        mount_covariance=covariance[unknown:, unknown:],
+        mount=values[unknown : unknown + 2],
+        mount_covariance=covariance[unknown : unknown + 2, unknown : unknown + 2],
         model_error=error,
         residuals=problem.residuals(values),
         chi_square=chi_square,
@@ -199,25 +205,25 @@ class _Problem:
         measurements: Sequence[StaticMeasurement],
         settings: IdentificationSettings,
     ) -> None:
-        self._mount_spread = settings.mount_spread
+        self._disturbances = disturbance_spread(settings)
         self._unknown = len(base.columns) - 1
         postures = [regressor_of(robot, each.side).cop(each.joint_positions, each.down) for each in measurements]
         self._com_z = np.array([base.rows(posture.com)[2] for posture in postures])
         self._rows = np.vstack([base.rows(posture.cop) for posture in postures])
+        self._robot, self._measurements = robot, measurements
         self._slope_changes = [posture.slope_change for posture in postures]
         self._cop = np.concatenate([measurement.cop for measurement in measurements])
         self._noise = np.array([measurement.cop_covariance for measurement in measurements])
-        self._nuisance = np.zeros((len(self._cop), 2))
+        self._nuisance = np.zeros((len(self._cop), len(self._disturbances)))
 
     def solve(self, start: Array) -> tuple[Array, Array, float, float]:
-        """Return the unknowns with beta, their covariance, s, and chi^2 without s; start is (r,) theta_b for c_z."""
+        """Return unknowns with beta, o, k, their covariance, s, and chi^2 without s; start: (r,) theta_b for c_z."""
         unknown = self._unknown
-        values = np.append(start[:unknown], (0.0, 0.0))
+        values = np.append(start[:unknown], np.zeros(len(self._disturbances)))
         for _ in range(ROUNDS):
             heights = self._com_z[:, :unknown] @ values[:unknown] + self._com_z[:, unknown]
-            self._nuisance = np.vstack(
-                [-height * change for height, change in zip(heights, self._slope_changes, strict=True)]
-            )
+            postures = zip(self._measurements, heights.tolist(), self._slope_changes, strict=True)
+            self._nuisance = np.vstack([disturbance_rows(self._robot, *posture) for posture in postures])
             error = self._model_error()
             values, covariance, _ = self._least_squares(error)
         return values, covariance, error, self._least_squares(0.0)[2]
@@ -243,15 +249,14 @@ class _Problem:
         return float(scipy.optimize.brentq(excess, 0.0, top, xtol=1e-7))
 
     def _least_squares(self, error: float) -> tuple[Array, Array, float]:
-        """Return values, covariance and chi^2, with beta's prior, for a model error s."""
+        """Return values, covariance and chi^2, with the priors of beta, o and k, for a model error s."""
         whiten = [np.linalg.inv(np.linalg.cholesky(noise + error**2 * np.eye(2))) for noise in self._noise]
         known = np.column_stack((self._rows[:, :-1], self._nuisance))
         target = self._cop - self._rows[:, -1]
         rows = np.vstack([each @ known[2 * j : 2 * j + 2] for j, each in enumerate(whiten)])
         wanted = np.concatenate([each @ target[2 * j : 2 * j + 2] for j, each in enumerate(whiten)])
-        mounting = np.zeros((2, known.shape[1]))
-        mounting[:, -2:] = np.eye(2) / self._mount_spread
-        rows, wanted = np.vstack((rows, mounting)), np.append(wanted, (0.0, 0.0))
+        prior = np.eye(known.shape[1])[-len(self._disturbances) :] / self._disturbances[:, None]
+        rows, wanted = np.vstack((rows, prior)), np.append(wanted, np.zeros(len(prior)))
         # Columns of one size, so that the rank does not depend on units.
         size = np.linalg.norm(rows, axis=0)
         size[size == 0.0] = 1.0
@@ -260,6 +265,28 @@ class _Problem:
         inverse = right.T / singular / size[:, None]
         values = inverse @ (left.T @ wanted)
         return values, inverse @ inverse.T, float(np.sum((rows @ values - wanted) ** 2))
+
+
+def disturbance_rows(robot: Robot, measurement: StaticMeasurement, com_height: float, slope_change: Array) -> Array:
+    """Return (2, 8) by what the CoP of a posture changes with beta, o_left, o_right and k of eq. (2d).
+
+    Args:
+        robot: Gives the cells' places.
+        measurement: The posture.
+        com_height: c_z above its sole [m].
+        slope_change: (2, 2) of the posture, see `CopRows`.
+    """
+    rows = np.zeros((2, 8))
+    foot = get_args(Side).index(measurement.side)
+    rows[:, :2] = -com_height * slope_change
+    rows[:, 2 + 2 * foot : 4 + 2 * foot] = np.eye(2)
+    rows[:, 6:] = np.diag(measurement.cop - np.mean(robot.feet[foot].cells, axis=0))
+    return rows
+
+
+def disturbance_spread(settings: IdentificationSettings) -> Array:
+    """Return (8,) the standard deviations of beta [rad], o_left, o_right [m] and k."""
+    return np.array([settings.mount_spread] * 2 + [settings.cop_spread] * 4 + [settings.rim_spread] * 2)
 
 
 def _check_shapes(robot: Robot, measurements: Sequence[StaticMeasurement]) -> None:

@@ -101,7 +101,8 @@ def most_probable_body(found: ComIdentification) -> WholeBody:
 def as_body(found: ComIdentification, whole: WholeBody, source: BodySource) -> Body:
     """Return what a body file keeps of an identification: the whole body, and the base parameters behind it."""
     links = links_of(whole.robot.links)
-    return Body(found.prior.variant, source, links, found.base.names, found.values, found.covariance)
+    names, error = found.base.names, found.model_error
+    return Body(found.prior.variant, source, links, names, found.values, found.covariance, error)
 
 
 def _with_bodies(robot: Robot, theta: Array) -> Robot:

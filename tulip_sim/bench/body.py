@@ -29,6 +29,7 @@ class Body:
         parameters: MotionParameters | None = None,
         world: WorldParameters | None = None,
         true_body: Robot | None = None,
+        believed: Robot | None = None,
     ) -> None:
         """Put a robot on the field.
 
@@ -39,10 +40,11 @@ class Body:
             parameters: Of motion control.
             world: Physics and sensors.
             true_body: Whose masses, CoMs and inertias the robot really has; None for those of the robot file.
+            believed: What motion control takes the robot for; None for what the robot file says.
         """
         scenario = Scenario(robot=robot, ball=ball, poles=False)
         self.world = World(scenario, world or WorldParameters(), seed, true_body=true_body)
-        self.motion = Motion(parameters or MotionParameters(), self.world.robot)
+        self.motion = Motion(parameters or MotionParameters(), believed or self.world.robot)
         self.greatest_tilt = 0.0  # [rad]
         self.greatest_efforts = np.zeros(14)  # [N m]
         self.greatest_speeds = np.zeros(14)  # [rad/s]

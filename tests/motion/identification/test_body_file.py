@@ -34,6 +34,7 @@ def body_of(seed: int) -> Body:
         base_names=("m c_x(base_link) + 0.085 m(left_hip_motor and below)", "m c_z(head)", "m(base_link) + m(neck)"),
         base_values=rng.standard_normal(3),
         base_covariance=factor @ factor.T,
+        model_error=2e-4,
     )
 
 

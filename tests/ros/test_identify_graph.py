@@ -1,0 +1,43 @@
+"""The experiment as nodes: begun, aborted by its service, and recorded."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from tulip_motion.identification.experiment_plan import PlanParameters
+from tulip_motion.identification.experiment_settings import ExperimentSettings
+from tulip_motion.identification.passages import Doing
+from tulip_motion.identification.progress import Progress
+from tulip_ros.launch import Launcher
+from tulip_ros.log_file import Log
+from tulip_ros.run import session
+from tulip_sim.identify_graph import Watcher, experiment_nodes
+
+pytestmark = [pytest.mark.ros, pytest.mark.sim, pytest.mark.slow, pytest.mark.usefixtures("ros_domain")]
+
+LONGEST = 120.0  # [s] of wall-clock time, after which the test has failed
+
+
+def test_abort_by_the_service_ends_in_a_stand_and_the_recording_says_why(tmp_path: Path):
+    settings = ExperimentSettings(plan=PlanParameters(postures=9, candidates=40))
+    record, last = tmp_path / "experiment", None
+    with (
+        Launcher(experiment_nodes(settings, "sim", 1, record), tmp_path / "logs") as launcher,
+        session(Watcher, arguments=[], handle_signals=False) as (watcher, spin),
+    ):
+        asked, end = False, time.monotonic() + LONGEST
+        while (last is None or not last.finished) and time.monotonic() < end:
+            spin(0.1)
+            assert launcher.poll() == []  # no node died
+            last = watcher.progress
+            if last is not None and last.doing is Doing.MOVE and not asked:
+                asked = True
+                watcher.abort()
+    assert isinstance(last, Progress)
+    assert (last.finished, last.doing, last.reason) == (True, Doing.STAND, "on request")
+    with Log(record) as log:
+        names = {name for name, topic in log.topics.items() if topic.messages}
+    assert {"/identification/progress", "/joint_states", "/imu", "/foot_forces", "/legs/joint_command"} <= names

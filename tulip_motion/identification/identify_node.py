@@ -1,0 +1,79 @@
+"""The identification experiment as a node, in place of motion and head: sensors in, commands for all joints out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from std_srvs.srv import Trigger
+
+from tulip_motion.identification.experiment_settings import ExperimentSettings, make_experiment
+from tulip_motion.messages import joint_command_to_message, progress_to_message, sensors_from_messages
+from tulip_ros import topics
+from tulip_ros.errors import BadInputError
+from tulip_ros.matching import SameStamp
+from tulip_ros.run import ComponentNode, run
+from tulip_ros.time import stamp_of
+
+REPORT_TICKS = 25  # progress goes out at 10 Hz
+
+
+class IdentifyNode(ComponentNode):
+    """Turns messages into calls of the experiment and its answers into messages."""
+
+    def __init__(self) -> None:
+        """Plan, which takes some seconds, and connect."""
+        super().__init__("identify")
+        self._settings = self.load(ExperimentSettings())
+        try:
+            self.begin_anew()
+        except ValueError as error:
+            raise BadInputError(f"Parameters of node 'identify': {error}") from error
+        self._joints = self.sender(topics.LEG_COMMAND)
+        self._progress = self.sender(topics.IDENTIFICATION)
+        self.listen(topics.JOINT_STATES, lambda message: self._on_sensor("joint_states", message))
+        self.listen(topics.IMU, lambda message: self._on_sensor("imu", message))
+        self.listen(topics.FOOT_FORCES, lambda message: self._on_sensor("foot_forces", message))
+        abort = topics.ABORT_IDENTIFICATION
+        self.create_service(abort.type, abort.name, self._on_abort)
+
+    def begin_anew(self) -> None:
+        """Make the core, and forget the sensors of before."""
+        self._experiment = make_experiment(self._settings)
+        self._sensors = SameStamp("joint_states", "imu", "foot_forces")
+        self._tick = 0
+
+    def _on_sensor(self, name: str, message: Any) -> None:
+        """Answer the sensors once all three messages of an instant are here."""
+        complete = self._sensors.add(name, stamp_of(message), message)
+        if complete is None:
+            return
+        try:
+            sensors = sensors_from_messages(*complete)
+        except ValueError as error:
+            self.health.count("refused sensors", str(error))
+            return
+        before = self._experiment.reason
+        self._joints.publish(joint_command_to_message(self._experiment.tick(sensors)))
+        if self._experiment.reason != before:
+            self.health.count("aborted", f"experiment aborted: {self._experiment.reason}")
+        self._tick += 1
+        if self._tick % REPORT_TICKS == 0:
+            self._progress.publish(progress_to_message(self._experiment.progress))
+
+    def _on_abort(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        experiment = self._experiment
+        if experiment.finished or experiment.reason:
+            response.message = f"the experiment has ended or ends: {experiment.reason or 'all postures were held'}"
+        else:
+            experiment.abort("on request")
+            response.success = True
+        return response
+
+
+def main() -> None:
+    """Run the node."""
+    run(IdentifyNode)
+
+
+if __name__ == "__main__":
+    main()
