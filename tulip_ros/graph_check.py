@@ -16,8 +16,8 @@ from tulip_ros.finding import Level
 from tulip_ros.nodes import DRIVER, ROBOT
 from tulip_ros.topics import Topic
 
-STAND_INS = {"vision": "perception"}
-"""Nodes whose work another one may do."""
+STAND_INS: dict[str, frozenset[str]] = {"perception": frozenset({"vision"}), "identify": frozenset(ROBOT)}
+"""Nodes that need not be there while another one is: perception replaces vision, an experiment moves alone."""
 SLOW = 0.3  # times real time, below which somebody should know that the machine is too busy
 RATE_SHARE = 0.7  # of the expected rate, below which a topic is too rare
 
@@ -114,7 +114,8 @@ def _twins(facts: GraphFacts) -> Iterator[Diagnosis]:
 def _nodes(facts: GraphFacts) -> Iterator[Diagnosis]:
     for space in robots(facts):
         here = {_base(name) for name in facts.nodes if name.rpartition("/")[0] == space}
-        missing = [name for name in ROBOT if name not in here and STAND_INS.get(name) not in here]
+        replaced = frozenset[str]().union(*(STAND_INS[name] for name in STAND_INS.keys() & here))
+        missing = [name for name in ROBOT if name not in here | replaced]
         for name in missing:
             yield Diagnosis(Level.ERROR, "nodes", f"{space}/{name} is missing: look into its log and start it again")
         if not facts.publishers.get(f"{space}/{topics.JOINT_STATES.name}"):

@@ -9,6 +9,7 @@ from time import monotonic
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rich.markup import escape
 from rich.table import Table
 
 from tulip_ros import topics
@@ -73,7 +74,7 @@ class Monitor:
         """Return a table of all processes, with the sum as its title."""
         whole, reports = self.summary(), self.reports()
         style = STYLES[_word(whole)]
-        table = Table(box=None, pad_edge=False, title=f"[{style}]{whole.words}[/]", title_justify="left")
+        table = Table(box=None, pad_edge=False, title=f"[{style}]{escape(whole.words)}[/]", title_justify="left")
         for column in ("node", "process", "restarts", "health", "processor", "fastest input [1/s]", "says"):
             table.add_column(column)
         for state in states:
@@ -88,7 +89,7 @@ class Monitor:
                 f"[{STYLES.get(word, 'red')}]{word}[/]",
                 "" if report is None else f"{report.values.get('processor [%]', '-')} %",
                 f"{rates[fastest]:.0f} {fastest}" if fastest else "-",
-                "" if report is None else report.words,
+                "" if report is None else escape(report.words),
             )
         return table
 

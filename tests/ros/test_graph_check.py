@@ -94,6 +94,12 @@ def test_perception_may_stand_in_for_vision() -> None:
     assert wrong(replace(HEALTHY, nodes=nodes, reports=dict.fromkeys(nodes, WELL))) == []
 
 
+def test_an_experiment_moves_the_body_alone() -> None:
+    nodes = ("/driver", "/identify")
+    publishers = {"/joint_states": HEALTHY.publishers["/joint_states"]}
+    assert wrong(GraphFacts(nodes, publishers, {}, {}, None, dict.fromkeys(nodes, WELL), "1")) == []
+
+
 def test_a_missing_driver_is_told_by_what_it_does_not_send() -> None:
     nodes = tuple(name for name in NODES if name != "/driver")
     publishers = {name: these for name, these in HEALTHY.publishers.items() if "driver" not in str(these)}
