@@ -106,6 +106,8 @@ def test_robot_curves_camera_and_health_show(browser: Any, pictures: Path, page_
     for node in ("driver", "vision", "worldmodel", "motion", "strategy"):
         page.get_by_text(f"/: {node}").wait_for()
     page.get_by_text("running").first.wait_for()
+    page.get_by_text("Open settings to configure").locator("..").get_by_role("button").click()
+    page.mouse.click(24, 24)  # the list of topics makes room
     marker = ((85, 150, 80), (95, 255, 255))  # cyan, of the chest
     turf = ((40, 80, 40), (75, 255, 255))
     until(lambda: share(canvases(page)[0], *marker) > 0.001)
@@ -114,7 +116,4 @@ def test_robot_curves_camera_and_health_show(browser: Any, pictures: Path, page_
     until(lambda: sum(share(crop, *curves) > 0.001 for crop in canvases(page)) >= 3)
     before = canvases(page)[0]
     until(lambda: np.mean(np.any(canvases(page)[0] != before, axis=2)) > 0.02)  # it walks
-    page.get_by_text("Open settings to configure").locator("..").get_by_role("button").click()
-    page.mouse.click(24, 24)  # the list of topics makes room
-    time.sleep(3.0)
     page.screenshot(path=pictures / "foxglove.png")
