@@ -40,7 +40,10 @@ def open_server(port: int, lan: bool) -> viser.ViserServer:
         server._websock_server.unregister_handler(message)
 
     async def refuse_strangers(connection: WebsockClientConnection) -> None:
-        """End connections that a page from elsewhere opened in the user's browser: it could command the robot."""
+        """End connections that a page from elsewhere opened in the user's browser: it could command the robot.
+
+        They end before anything was sent to them, so that they never learn the names by which buttons are pressed.
+        """
         opened = server._websock_server._live_connections[connection.client_id]
         request = opened.request
         if request is not None and not is_own(request.headers.get("Origin"), lan):
