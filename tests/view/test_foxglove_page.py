@@ -16,16 +16,14 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from browser import MARKS, PATIENCE
 from foxglove_viewer import free_port
-from test_report_browser import CHROMIUM, PATIENCE, browser, pictures
 
 import tulip_view.bridge
 from tulip_ros.launch import Launcher
 from tulip_ros.nodes import find_node
 from tulip_ros.plan import Start
 from tulip_sim.match_graph import trial_plan
-
-__all__ = ["browser", "pictures"]  # fixtures
 
 PAGE = Path(__file__).with_name("foxglove_page")
 LIBRARY = PAGE / "node_modules"
@@ -37,11 +35,10 @@ SOON = {"initial_time": 0.5, "ready_time": 0.5, "set_time": 1.0}
 """Times of the referee [s]: play begins soon."""
 
 pytestmark = [
-    pytest.mark.browser,
+    *MARKS,
     pytest.mark.ros,
     pytest.mark.sim,
     pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no browser on the PATH"),
     pytest.mark.skipif(not LIBRARY.exists(), reason=f"run `npm install --ignore-scripts` in {PAGE.name}"),
 ]
 

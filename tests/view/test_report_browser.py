@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from browser import MARKS, PATIENCE, pictures_folder, started
+from browser import MARKS, PATIENCE
 from recordings_to_view import play
 
 from tulip_ros.log_file import Log
@@ -27,17 +27,6 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with Log(play(folder / "trial", 1.3)) as log:
         (folder / "report.html").write_text(make_page(make_report(log, "", lambda number: None)), encoding="utf-8")
     return folder / "report.html"
-
-
-@pytest.fixture(scope="module")
-def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return pictures_folder(tmp_path_factory.mktemp("pictures"))
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with started() as running:
-        yield running
 
 
 class Opened:
