@@ -38,6 +38,7 @@ NOT_IN_LOCKSTEP = {
     topics.START_POSE,  # in matches alone
     topics.REPORT,
     topics.USER_WISH,  # nobody is there to wish
+    topics.IDENTIFICATION,  # in experiments alone
 }
 
 
