@@ -65,13 +65,17 @@ def test_a_page_from_elsewhere_in_the_same_browser_is_refused(server: viser.Vise
         assert own.recv(timeout=PATIENCE)
 
 
-def test_a_malformed_message_ends_its_sender_and_nobody_else(server: viser.ViserServer):
+def test_a_malformed_message_ends_its_sender_and_nobody_else(
+    server: viser.ViserServer, caplog: pytest.LogCaptureFixture
+):
     with visit(server, None) as good, visit(server, None) as bad:
         assert good.recv(timeout=PATIENCE)
         bad.send(b"\xff\x00 no message")
         with pytest.raises(ConnectionClosed):
             while True:
                 bad.recv(timeout=PATIENCE)
+        (told,) = [record for record in caplog.records if record.name == "websockets.server"]
+        assert told.getMessage().startswith("the page: connection handler failed") and not told.exc_info
         server.scene.add_frame("/still_here")
         server.flush()
         assert good.recv(timeout=PATIENCE)

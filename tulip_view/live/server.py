@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import ipaddress
+import logging
 import socket
 from urllib.parse import urlsplit
 
@@ -28,6 +29,7 @@ def open_server(port: int, lan: bool) -> viser.ViserServer:
     Raises:
         BadInputError: if the port is taken or cannot be had.
     """
+    logging.getLogger("websockets.server").addFilter(in_one_line)
     host = EVERYWHERE if lan else LOOPBACK
     _check(host, port)
     with contextlib.redirect_stdout(io.StringIO()):  # it prints a frame with an address that may not be the page's
@@ -73,6 +75,14 @@ def is_own(origin: str | None, lan: bool) -> bool:
     except ValueError:
         return False
     return lan or address.is_loopback
+
+
+def in_one_line(record: logging.LogRecord) -> bool:
+    """Shorten the log of a connection that failed, since the other side sent what makes no sense, to one line."""
+    if record.exc_info:
+        record.msg, record.args = f"the page: {record.getMessage()} ({record.exc_info[1]})", ()
+        record.exc_info = record.exc_text = None
+    return True
 
 
 def _check(host: str, port: int) -> None:
