@@ -98,6 +98,7 @@ class MovingPoint:
         self._filter.P[4:, 4:] = np.diag(camera.variances)
         self._filter.P[:2, 4:] = place.by_error * camera.variances
         self._filter.P[4:, :2] = self._filter.P[:2, 4:].T
+        self._tidy()
 
     @property
     def state(self) -> Array:

@@ -18,6 +18,7 @@ from rosbags.highlevel import AnyReader
 from tulip_msgs.msg import MotionState, WorldState
 from tulip_ros import bag, topics
 from tulip_ros.errors import BadInputError
+from tulip_ros.raw_topic import Taken
 from tulip_ros.recorder_node import RecorderNode, RecorderParameters
 from tulip_ros.run import session
 from tulip_ros.time import header
@@ -165,7 +166,7 @@ def test_services_start_and_stop_recordings(ros_domain: int, tmp_path: Path):
         again = node.on_start(start.Request(), start.Response())
         assert not again.success and "stop it first" in again.message
         source = node.inputs["/motion_state"]
-        node.write([(2, 1, source, serialize_message(MotionState()), 1)])
+        node.write([(source, Taken(2, 1, serialize_message(MotionState()), 1))])
         ended = node.on_stop(stop.Request(), stop.Response())
         assert ended.success and "1 messages" in ended.message
         refused = node.on_start(start.Request(path=str(tmp_path / "one")), start.Response())

@@ -48,6 +48,8 @@ def write_split(folder: Path, split: Split, count: int) -> Bag:
     for number in range(count):
         data = serialize_message(MotionState(phase=number / count, reason=os.urandom(2000).hex()))
         bag.write("/motion_state", data, number * SECOND // 10)
+        if number % 50 == 0:
+            time.sleep(0.01)  # messages come over time: what counts is how much the writer has written
     bag.close()
     return bag
 
