@@ -25,12 +25,15 @@ APART = (
 
 
 class LearningFile:
-    """Where a learner keeps what it learned between runs: the file `learning_file`, if any."""
+    """Where a learner keeps what it learned between runs: `learning_file`, if any.
+
+    A path without the ending .npz is a folder, in which each robot and gait has a file of its own.
+    """
 
     def __init__(self, parameters: MotionParameters, robot: Robot, learner: StepLearner) -> None:
         """Give the learner what the file holds; one that does not fit is left alone until the next `save`."""
-        self._path = Path(parameters.learning_file) if parameters.learning_file else None
         self._owner = belongs_to(parameters, robot)
+        self._path = _path_for(parameters.learning_file, self._owner)
         self._learner = learner
         self.note = ""
         """What went wrong with the file, in words, or ""."""
@@ -53,6 +56,16 @@ class LearningFile:
             save(self._path, self._owner, learner.situations)
         except OSError as error:
             self.note = f"learning file {self._path} cannot be written: {error}"
+
+
+def _path_for(name: str, owner: Mapping[str, object]) -> Path | None:
+    """Return the file of an owner, or None if nothing is kept."""
+    if not name:
+        return None
+    if name.endswith(".npz"):
+        return Path(name)
+    digest = hashlib.sha256(json.dumps(owner, sort_keys=True).encode()).hexdigest()
+    return Path(name) / f"{digest[:16]}.npz"
 
 
 class LearningFileError(Exception):

@@ -174,7 +174,9 @@ class MotionParameters:
 
     # Iterative learning over steps, eqs. (16)-(18)
     learning: str = "none"  # "none", "adaptive" (the paper's law) or "waveform" (a torque over the step)
-    learning_file: str = ""  # read at the start if it exists, written when the robot stops walking; "" keeps nothing
+    # Read at the start if it exists, written when the robot stops walking: an .npz file, or a folder with one for each
+    # robot and gait; "" keeps nothing.
+    learning_file: str = ""
     learning_bound: float = 0.15  # share of a joint's torque limit that learning may use
     learning_margin: float = 1.2  # joint error by that without learning: above it learning does harm
     learning_patience: int = 3  # steps running on one foot above the margin, then it switches itself off

@@ -275,6 +275,25 @@ def test_a_file_that_does_not_fit_is_refused_with_the_reason(tmp_path: Path) -> 
     assert "another robot" in _note_for_other_robot(tmp_path)
 
 
+def test_a_folder_keeps_what_each_gait_learned_apart(tmp_path: Path) -> None:
+    slow = replace(WAVEFORM, learning_file=str(tmp_path / "learned"))
+    quick = replace(slow, step_time=0.5)
+    found = {}
+    for parameters in (slow, quick):
+        learner = StepLearner(parameters, LIMITS)
+        file = LearningFile(parameters, load_robot(), learner)
+        assert file.note == "" and not learner.situations  # the other gait's memory is neither taken nor refused
+        Leg(learner, parameters).walk(10)
+        file.save()
+        found[parameters.step_time] = learner.situations
+    assert len(list((tmp_path / "learned").iterdir())) == 2
+    for parameters in (slow, quick):
+        again = StepLearner(parameters, LIMITS)
+        assert LearningFile(parameters, load_robot(), again).note == ""
+        for key, situation in found[parameters.step_time].items():
+            np.testing.assert_array_equal(again.situations[key].memory, situation.memory)
+
+
 def _note_for_other_robot(folder: Path) -> str:
     parameters = replace(WAVEFORM, learning_file=str(folder / "other.npz"))
     learner = StepLearner(parameters, LIMITS)
