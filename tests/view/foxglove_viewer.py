@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import socket
 import struct
 from collections.abc import Callable
 from typing import Any
@@ -21,13 +20,6 @@ MESSAGE, TIME, SERVICE_RESPONSE = 1, 2, 3
 """What the server sends, by the first byte."""
 PUBLISH, SERVICE_REQUEST = 1, 2
 """What a viewer sends, by the first byte."""
-
-
-def free_port() -> int:
-    """Return a port of 127.0.0.1 that nobody uses now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class Viewer:

@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from foxglove_viewer import Viewer, free_port, serialized
+from foxglove_viewer import Viewer, serialized
 from mcap_ros2._dynamic import generate_dynamic
+from ports import free_port
 from rosbags.typesys import get_types_from_msg
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 import pytest
 from browser import MARKS, PATIENCE
-from foxglove_viewer import free_port
+from ports import free_port
 
 import tulip_view.bridge
 from tulip_ros.launch import Launcher

@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 import pytest
 from browser import MARKS, PATIENCE
+from ports import free_port
 from rclpy.node import Node
 
 from tulip_msgs.msg import UserCommand
@@ -34,12 +35,6 @@ pytestmark = MARKS
 WALK = Path(__file__).parent.parent / "data" / "recordings" / "walk"
 PRESSES = 5
 SOON = 0.2  # [s] within which limp must be on its topic
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class Opened:

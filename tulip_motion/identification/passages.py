@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from tulip_description.positive import check_positive
 from tulip_motion.identification.experiment_plan import FootPlan
 from tulip_motion.identification.posture_roads import Road
 from tulip_motion.interface import Side
@@ -68,9 +69,7 @@ class Pace:
         Raises:
             ValueError: if one is not positive.
         """
-        for name, value in vars(self).items():
-            if not value > 0.0:
-                raise ValueError(f"{name} is {value}; expected > 0")
+        check_positive(self)
 
 
 STANDING = Passage(Doing.STAND, Side.LEFT, None, 0.0, (BOTH, BOTH))

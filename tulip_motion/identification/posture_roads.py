@@ -97,8 +97,8 @@ class RoadMap:
             for i in range(1, len(order) - 2):
                 for j in range(i + 1, len(order) - 1):
                     a, b, c, d = order[i - 1], order[i], order[j], order[j + 1]
-                    gain = self.distances[a, b] + self.distances[c, d] - self.distances[a, c] - self.distances[b, d]
-                    if gain > 1e-9:
+                    # Compared as sums: where roads are blocked, distances are infinite, and have no difference.
+                    if self.distances[a, c] + self.distances[b, d] + 1e-9 < self.distances[a, b] + self.distances[c, d]:
                         order[i : j + 1] = order[i : j + 1][::-1]
                         improved = True
         return order[1:-1]

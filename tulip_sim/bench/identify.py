@@ -145,9 +145,10 @@ def summarize(rows: list[Row]) -> list[str]:
     lines = [
         "Each link's mass is changed by up to 20 % and its CoM by up to 2 cm on each axis, and nobody is told; in case"
         f" `{TABLE}` the robot of 23 kg is believed to be the team's table of 16.74 kg. The robot holds 40 static"
-        " postures, half of them on each foot; cells, encoders and IMU err as ever, and the soles tilt on the soft"
-        f" floor. Error of the CoM on {UNSEEN} other postures, anywhere inside the joints' ranges, RMS in x and y."
-        f" Asked for: {BAR:g} mm, {BETTER:g} times better than before; NEES (all base parameters, by their number)"
+        " postures, half of them on each foot; cells, encoders and IMU err as ever, and cells feel what presses on the"
+        f" sole's rim at their own edge. Error of the CoM on {UNSEEN} other postures, anywhere inside the joints'"
+        f" ranges, RMS in x and y. Asked for: {BAR:g} mm, {BETTER:g} times better than before; NEES (all base"
+        " parameters, by their number)"
         f" between its bounds in {SURE:.0%} of the cases.",
         "",
         "| body | held | experiment | before x, y | after x, y | better | NEES (bounds) | mass found (true) |",
