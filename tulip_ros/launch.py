@@ -112,8 +112,8 @@ class Launcher:
         recorders = [process for process in self._processes if process.is_recorder]
         _end([process for process in self._processes if process not in recorders])
         _end(recorders)
-        if any(process.was_killed for process in self._processes):
-            transport.remove_leftovers()
+        # Not only after a kill: now and then Fast DDS leaves a port behind of nodes that end at the same time.
+        transport.remove_leftovers()
 
 
 class _Process:
@@ -130,7 +130,6 @@ class _Process:
         self._given_up = False
         self._ended = False
         self._exit_code: int | None = None
-        self.was_killed = False  # at any time: it could not remove its shared memory then
 
     @property
     def is_recorder(self) -> bool:
@@ -162,7 +161,6 @@ class _Process:
         if code is None:
             return []
         self._process, self._exit_code = None, code
-        self.was_killed |= code < 0
         if code == EXIT_BAD_INPUT:
             self._given_up = True
             raise BadInputError(f"Node {self.name} refused what it was given: {self._refusal()}")
@@ -200,7 +198,6 @@ class _Process:
     def forget(self) -> None:
         if self._process is not None:
             self._exit_code = self._process.wait()
-            self.was_killed |= self._exit_code < 0
         self._process, self._ended = None, True
 
     def _refusal(self) -> str:

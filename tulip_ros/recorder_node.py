@@ -26,6 +26,7 @@ from tulip_ros.serialized import time_at
 from tulip_ros.topics import Quality
 
 LOOK = 0.5  # [s] between two looks for new topics and nodes, and at the disk
+WAIT = 20.0  # [s] at most for the nodes of `wait_for`
 COLLECT = 0.02  # [s] between two times that waiting messages are taken: one waking for many is cheap
 PICTURES = {
     "compressed": (r"/(.*/)?camera/image_raw", r"/(.*/)?vision/picture"),
@@ -54,6 +55,7 @@ class RecorderParameters:
         split_size: Size of a file after which the recording goes on in another one [MB]; 0 for one file.
         split_time: Time in a file after which the recording goes on in another one [s]; 0 for one file.
         free_space: Disk space to leave free [MB].
+        wait_for: Names of nodes without which time does not begin; the recorder serves once it surely hears them.
         notes: What goes into the recording about itself, as in "seed=1".
     """
 
@@ -69,6 +71,7 @@ class RecorderParameters:
     split_size: float = 0.0
     split_time: float = 0.0
     free_space: float = FREE / 1e6
+    wait_for: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -149,11 +152,12 @@ class RecorderNode(ComponentNode):
             )
         if self.settings.start:
             self.begin(self.settings.path, from_now=False)
-        # Last, since who waits for a recorder waits for its services.
-        self.create_service(topics.STOP_RECORDING.type, topics.STOP_RECORDING.name, self.on_stop)
-        self.create_service(topics.START_RECORDING.type, topics.START_RECORDING.name, self.on_start)
+        self._awaited = {f"{self.get_namespace().rstrip('/')}/{name}" for name in self.settings.wait_for}
+        self._serves = False
+        self._waits_until = time.monotonic() + WAIT
         self.every(COLLECT, self.collect)
         self.every(LOOK, self.discover)
+        self._serve()
 
     def begin(self, path: str, from_now: bool = True) -> Path:
         """Begin a recording and return its file.
@@ -244,8 +248,13 @@ class RecorderNode(ComponentNode):
             self.give_up(error)
 
     def learn(self, node: str, values: dict[str, Any]) -> None:
-        """Note the parameters of a node."""
+        """Note the parameters of a node.
+
+        A node that answers has found the question's way back, which is younger than all subscriptions made at the
+        start, and nodes learn of such things in the order in which they were made: its messages arrive from now on.
+        """
         self.known[node] = values
+        self._awaited.discard(node)
         if self.bag is not None:
             try:
                 log_notes.attach_parameters(self.bag, node, values, time.time_ns())
@@ -258,6 +267,7 @@ class RecorderNode(ComponentNode):
             if name not in self.inputs:
                 self.subscribe(name, type_name, *offered(self, name))
         self._asker.look()
+        self._serve()
         if self.bag is None:
             return
         try:
@@ -276,6 +286,17 @@ class RecorderNode(ComponentNode):
         except LookupError as error:
             self._refused.add(name)
             self.health.count("topics of unknown type", f"topic {name} is not recorded: {error}")
+
+    def _serve(self) -> None:
+        """Offer the services, once every awaited node is heard: who waits for a recorder waits for them."""
+        if self._serves or (self._awaited and time.monotonic() < self._waits_until):
+            return
+        self._serves = True
+        if self._awaited:
+            names = ", ".join(sorted(self._awaited))
+            self.health.count("started without nodes", f"recording without word from {names}, after {WAIT:.0f} s")
+        self.create_service(topics.STOP_RECORDING.type, topics.STOP_RECORDING.name, self.on_stop)
+        self.create_service(topics.START_RECORDING.type, topics.START_RECORDING.name, self.on_start)
 
     def give_up(self, error: OSError) -> None:
         """End a recording that cannot go on; what reached the disk is kept."""

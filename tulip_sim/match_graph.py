@@ -116,6 +116,7 @@ def trial_plan(
         given["recorder"] = {
             "path": str(record.absolute()),
             "notes": [f"seed={seed}", f"scenario={scenario}", f"strategy={strategy}", "mode=graph", "robots=1"],
+            "wait_for": ["driver", *(name for name in nodes if name != "recorder")],
         }
         given["driver"]["wait_for"] = list(nodes)
     refuse_taken(parameter_files, given, "trial")

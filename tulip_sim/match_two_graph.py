@@ -130,6 +130,7 @@ def match_plan(
             "path": str(record.absolute()),
             "robots": list(NAMESPACES),
             "notes": [f"seed={seed}", f"striker={striker}", f"keeper={keeper}", "mode=graph", "robots=2"],
+            "wait_for": ["driver", *names],
         }
     refuse_taken(parameter_files, own, "match")
     for name in ("driver", "recorder"):

@@ -285,7 +285,7 @@ class SimulatorNode(ComponentNode, ABC):
     def _await_nodes(self, spin: Spin) -> None:
         """Wait until the nodes of `wait_for` are in the graph, so that time begins with whole robots.
 
-        A recorder is there once it serves: by then it has subscribed to everything.
+        A recorder is there once it serves: by then it surely hears the nodes that it was told to wait for.
         """
         p, own = self._pace_settings, self.get_namespace().rstrip("/")
         begin = time.monotonic()

@@ -215,6 +215,40 @@ def test_recorder_counts_what_it_lost_and_notes_the_parameters_of_nodes(ros_doma
         assert known["recorder"]["pictures"] == "compressed"
 
 
+AWAITED = """
+from tulip_ros.run import ComponentNode, session
+
+with session(lambda: ComponentNode("motion"), []) as (node, spin):
+    while True:
+        spin(0.1)
+"""
+
+
+@pytest.mark.ros
+def test_recorder_serves_once_it_hears_the_nodes_it_waits_for(ros_domain: int, tmp_path: Path):
+    settings = RecorderParameters(path=str(tmp_path / "trial"), wait_for=("motion",))
+    serves: list[bool] = []
+
+    def look(node: RecorderNode) -> bool:
+        serves.append("/start_recording" in dict(node.get_service_names_and_types()))
+        return serves[-1]
+
+    with session(lambda: RecorderNode(settings), []) as (node, spin):
+        spin(1.0)
+        assert not look(node) and "/motion" not in node.known
+        awaited = subprocess.Popen([sys.executable, "-c", AWAITED])
+        try:
+            deadline = time.monotonic() + 15.0  # less than the recorder waits for a node that never comes
+            while not look(node) and time.monotonic() < deadline:
+                assert "/motion" not in node.known
+                spin(0.05)
+        finally:
+            awaited.kill()
+            awaited.wait()
+        assert serves[-1] and "/motion" in node.known
+        node.end()
+
+
 @pytest.mark.ros
 def test_recording_begun_later_begins_with_what_holds(ros_domain: int, tmp_path: Path):
     def make() -> RecorderNode:

@@ -18,7 +18,7 @@ from tulip_description.planar import Pose2D
 from tulip_ros import topics
 from tulip_ros.bag import Bag
 from tulip_ros.errors import BadInputError
-from tulip_ros.log_edit import writing
+from tulip_ros.log_edit import cut, writing
 from tulip_ros.log_file import Log
 from tulip_sim.lockstep import Lockstep, Settings
 from tulip_sim.lockstep_notes import explain_trial
@@ -145,6 +145,27 @@ def test_recorded_parameters_hold_and_those_that_are_gone_are_named(without_pict
     with Log(tmp_path / "old") as log:
         outcome = recompute(log, ["worldmodel"])
     assert any("worldmodel.gone" in line for line in outcome.shortcomings)
+
+
+def test_a_part_without_the_beginning_begins_where_it_was_recorded_and_tells_so(
+    without_pictures: Path, tmp_path: Path
+) -> None:
+    names = ["/odometry", "/features", "/world_state"]
+    with Log(without_pictures) as log:
+        cut(log, names, 10**9, 19 * 10**8, tmp_path / "part", lambda _: None)  # before somebody set the robot down
+    outcome = outcome_of(tmp_path / "part", "worldmodel")
+    assert [line for line in outcome.shortcomings if "begun in the middle" in line]
+    assert outcome.differences["/world_state"].largest["position [m]"] < 0.02
+    assert not [line for line in outcome.shortcomings if "no recorded parameters" in line]
+
+
+def test_a_recording_without_parameters_tells_so(without_pictures: Path, tmp_path: Path) -> None:
+    with Log(without_pictures) as log, writing(tmp_path / "bare") as bag:
+        for each in log.records(["/odometry", "/features", "/world_state"], None, 10**9):
+            bag.copy_topic(each.topic)
+            bag.write(each.topic.name, each.data, each.log_time)
+    (line,) = outcome_of(tmp_path / "bare", "worldmodel").shortcomings
+    assert line == "no recorded parameters of worldmodel: today's defaults were taken"
 
 
 def test_inputs_that_are_lost_are_counted(without_pictures: Path, tmp_path: Path) -> None:

@@ -114,6 +114,7 @@ class _Robot:
         }
         self.lossy = False
         self.forgotten = p.forgotten
+        self.without_parameters = [name for name in components if name not in p.noted]
         has_truth = judge and _full(namespace, topics.GROUND_TRUTH.name) in log.topics
         self.judge = Judge(p.field, self.writes) if has_truth else None
         self.bag: Bag | None = None
@@ -214,6 +215,9 @@ def _run(log: Log, robots: Sequence[_Robot], bag: Bag | None, progress: Callable
         if robot.forgotten:
             names = ", ".join(robot.forgotten)
             shortcomings.append(f"{where}{len(robot.forgotten)} recorded parameters that no longer exist: {names}")
+        if robot.without_parameters:
+            names = ", ".join(robot.without_parameters)
+            shortcomings.append(f"{where}no recorded parameters of {names}: today's defaults were taken")
         for stage in robot.stages:
             shortcomings += [f"{where}{count} {reason}" for reason, count in stage.shortcomings().items()]
     return Outcome(

@@ -36,6 +36,7 @@ class RobotParameters:
         start: Where it was told to stand, or None where nobody noted it.
         field: As its team sees it.
         forgotten: Names of parameters that the recording notes and today's components do not have.
+        noted: Names of the nodes whose parameters the recording notes.
     """
 
     vision: VisionParameters = dataclasses.field(default_factory=VisionParameters)
@@ -46,6 +47,7 @@ class RobotParameters:
     start: Pose2D | None = None
     field: Field = dataclasses.field(default_factory=load_field)
     forgotten: tuple[str, ...] = ()
+    noted: frozenset[str] = frozenset()
 
 
 def parameters_of(log: Log, namespace: str, files: Sequence[Path] = ()) -> RobotParameters:
@@ -66,10 +68,11 @@ def parameters_of(log: Log, namespace: str, files: Sequence[Path] = ()) -> Robot
         values["worldmodel"]["field_turned"] = values["strategy"]["field_turned"] = True
         values["vision"]["opponents.team_colour"] = COLOUR_NAMES[1]
     defaults = RobotParameters()
-    recorded, forgotten = noted(log), []
-    for name in NODES:
+    every, forgotten = noted(log), []
+    recorded = {name: every[full] for name in NODES if (full := f"{namespace}/{name}" if namespace else name) in every}
+    for name, block in recorded.items():
         known = parameters.flatten(getattr(defaults, name))
-        for key, value in recorded.get(f"{namespace}/{name}" if namespace else name, {}).items():
+        for key, value in block.items():
             if key in known:
                 values[name][key] = value
             elif name != "game_input":  # of its node only a part is needed here
@@ -82,7 +85,9 @@ def parameters_of(log: Log, namespace: str, files: Sequence[Path] = ()) -> Robot
     made: dict[str, Any] = {name: parameters.replace(getattr(defaults, name), values[name], name) for name in NODES}
     p = made["worldmodel"]
     start = Pose2D(p.start_x, p.start_y, p.start_yaw) if any(name in values["worldmodel"] for name in START) else None
-    return replace(defaults, **made, start=start, field=field_of(p), forgotten=tuple(forgotten))
+    return replace(
+        defaults, **made, start=start, field=field_of(p), forgotten=tuple(forgotten), noted=frozenset(recorded)
+    )
 
 
 def field_of(p: WorldModelNodeParameters) -> Field:

@@ -51,7 +51,7 @@ class WorldModelStage:
         Args:
             parameters: Of the node.
             field: As the robot's team sees it.
-            start: Where the robot was told to stand; None: where the first recorded state has it.
+            start: Where the robot was told to stand at the beginning of its run; None where nobody noted it.
         """
         self._parameters, self._field = parameters, field
         self._odometry: deque[Odometry] = deque()
@@ -59,8 +59,10 @@ class WorldModelStage:
         self._asked: deque[Heard] = deque()
         self._model: WorldModel | None = None
         self._start = start
+        self._placed = False  # by somebody, during the recording
         self._newest = -1  # stamp of the newest odometry heard [ns]
         self._seen = -1  # stamp of the newest features heard [ns]
+        self._newest_taken = self._seen_taken = -1  # the same of what was taken for states [ns]
         self._next_state = 0  # number of the next recorded state, if none is lost
         self._state_due = 0  # stamp of odometry from which the node's next state is due [ns]
         self._counts: Counter[str] = Counter()
@@ -73,7 +75,7 @@ class WorldModelStage:
                 yield from self._answer_all(None)
                 self._odometry.clear()
                 self._features.clear()
-                self._start, self._model = pose, None
+                self._start, self._placed, self._model = pose, True, None
             return
         if heard.name == ODOMETRY:
             odometry = odometry_of(heard)
@@ -103,14 +105,9 @@ class WorldModelStage:
         while self._asked:
             asked = self._asked[0]
             stamp, picture = asked.stamp, picture_of(asked)
-            has_odometry, has_features = self._newest >= stamp, self._seen >= picture or picture == 0
-            if not (has_odometry and has_features):
-                if now is not None and now - asked.log_time < OVERDUE:
-                    return
-                if not has_odometry:
-                    self._counts["world states whose odometry is not recorded"] += 1
-                if not has_features:
-                    self._counts["world states whose features are not recorded"] += 1
+            complete = self._newest >= stamp and (self._seen >= picture or picture == 0)
+            if not complete and now is not None and now - asked.log_time < OVERDUE:
+                return
             self._asked.popleft()
             yield from self._compute(asked, stamp, picture)
 
@@ -120,16 +117,22 @@ class WorldModelStage:
         told = asked.log_time >= UNIX_TIME and asked.record.sequence == self._next_state
         while self._odometry and self._odometry[0].stamp <= stamp:
             odometry = self._odometry.popleft()
+            self._newest_taken = odometry.stamp
             if told and odometry.stamp < stamp and odometry.stamp >= self._state_due:
                 self._counts["readings of odometry that the run's world model missed, and this one too"] += 1
             else:
                 model.add_odometry(odometry)
         while self._features and self._features[0].stamp <= picture:
             features = self._features.popleft()
+            self._seen_taken = features.stamp
             if told and features.stamp < picture:
                 self._counts["features that the run's world model missed, and this one too"] += 1
             else:
                 model.add_features(features)
+        if self._newest_taken != stamp:
+            self._counts["world states whose odometry is not recorded"] += 1
+        if picture not in (0, self._seen_taken):
+            self._counts["world states whose features are not recorded"] += 1
         self._next_state = asked.record.sequence + 1
         self._state_due = stamp + round(self._parameters.publish_period * 1e9)
         world = model.state(stamp)
@@ -141,11 +144,12 @@ class WorldModelStage:
             yield Made(name, asked.log_time, world.stamp, message)
 
     def _begin(self, first: Heard) -> WorldModel:
-        """Make the core where the robot was set down."""
-        recorded = Pose2D(*(float(value) for value in first.message.robot_pose))
-        start = self._start or recorded
-        if self._start is None and picture_of(first) > 0:
+        """Make the core where the robot was set down, or where a recording that began later has it."""
+        start = self._start
+        if not self._placed and (first.record.sequence > 0 or picture_of(first) > 0):
             self._counts["begun in the middle of a run, where the world model knew more than a recording tells"] += 1
+            start = None
+        start = start or Pose2D(*(float(value) for value in first.message.robot_pose))
         self._model = WorldModel(self._parameters, self._field, start)
         return self._model
 
