@@ -17,7 +17,7 @@ from tulip_ros import bag_metadata, schemas
 from tulip_ros.bag_metadata import FileEntry, TopicEntry
 from tulip_ros.bag_writer import BagWriter
 from tulip_ros.errors import BadInputError
-from tulip_ros.log_file import REPEATED, Log, LoggedTopic
+from tulip_ros.log_file import REPEATED, Log, LoggedTopic, Record
 from tulip_ros.mcap_file import Chunk, McapFile
 from tulip_ros.topics import Quality
 
@@ -207,6 +207,16 @@ class Bag:
             self._add_topic(topic.name, topic.type_name, topic.definition, topic.quality, 0)
         elif (known.type_name, known.definition) != (topic.type_name, topic.definition):
             raise ValueError(f"topic {topic.name} has different types; expected one")
+
+    def copy(self, record: Record) -> None:
+        """Write a message as another recording holds it.
+
+        Raises:
+            ValueError: if its topic was declared with another type or definition.
+            OSError: if the file cannot be written.
+        """
+        self.copy_topic(record.topic)
+        self.write(record.topic.name, record.data, record.log_time, record.publish_time)
 
     def write(self, name: str, data: bytes, stamp: int, published: int | None = None) -> None:
         """Write one message.

@@ -145,8 +145,7 @@ def _belongs(path: Path) -> bool:
 
 def _write(bag: Bag, records: Iterator[Record], advance: Advance) -> int:
     for number, record in enumerate(records, 1):
-        bag.copy_topic(record.topic)
-        bag.write(record.topic.name, record.data, record.log_time, record.publish_time)
+        bag.copy(record)
         if number % STEP == 0:
             advance(STEP)
             if not bag.has_space():

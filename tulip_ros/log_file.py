@@ -39,7 +39,11 @@ class DamagedLogError(BadInputError):
 
     def __init__(self, path: Path, what: str) -> None:
         super().__init__(f"Recording {path} {what}. Mend it first: python3 scripts/recover.py {path}")
-        self.path = path
+        self.path, self._what = path, what
+
+    def __reduce__(self) -> tuple[type[DamagedLogError], tuple[Path, str]]:
+        """Go from one process to another."""
+        return DamagedLogError, (self.path, self._what)
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from tulip_sim.lockstep_recording import LockstepRecording, RecordedPictures
 from tulip_sim.messages import jpeg_to_message, png_to_message
 from tulip_sim.perception import PerceptionParameters
 from tulip_sim.recompute.differences import Comparison
+from tulip_sim.recompute.heard import Made
 from tulip_sim.recompute.run import Outcome, recompute
 from tulip_sim.recompute.settings import parameters_of
 from tulip_sim.recompute.verdict import bounds_of, violations
@@ -139,8 +140,7 @@ def test_recorded_parameters_hold_and_those_that_are_gone_are_named(without_pict
         with writing(tmp_path / "old") as bag:
             for name in ("/odometry", "/features", "/world_state"):
                 for each in log.records([name], None, 10**9):
-                    bag.copy_topic(each.topic)
-                    bag.write(name, each.data, each.log_time)
+                    bag.copy(each)
             bag.attach("parameters/worldmodel.yaml", "text/yaml", b"worldmodel: {gone: 3, ball.floor: 1}\n")
     with Log(tmp_path / "old") as log:
         outcome = recompute(log, ["worldmodel"])
@@ -162,8 +162,7 @@ def test_a_part_without_the_beginning_begins_where_it_was_recorded_and_tells_so(
 def test_a_recording_without_parameters_tells_so(without_pictures: Path, tmp_path: Path) -> None:
     with Log(without_pictures) as log, writing(tmp_path / "bare") as bag:
         for each in log.records(["/odometry", "/features", "/world_state"], None, 10**9):
-            bag.copy_topic(each.topic)
-            bag.write(each.topic.name, each.data, each.log_time)
+            bag.copy(each)
     (line,) = outcome_of(tmp_path / "bare", "worldmodel").shortcomings
     assert line == "no recorded parameters of worldmodel: today's defaults were taken"
 
@@ -171,9 +170,8 @@ def test_a_recording_without_parameters_tells_so(without_pictures: Path, tmp_pat
 def test_inputs_that_are_lost_are_counted(without_pictures: Path, tmp_path: Path) -> None:
     with Log(without_pictures) as log, writing(tmp_path / "lossy") as bag:
         for index, each in enumerate(log.records(["/odometry", "/features", "/world_state"])):
-            bag.copy_topic(each.topic)
             if each.topic.name != "/features" or index % 10:
-                bag.write(each.topic.name, each.data, each.log_time)
+                bag.copy(each)
     outcome = outcome_of(tmp_path / "lossy", "worldmodel")
     assert outcome.differences["/world_state"].unmatched == 0.0
     assert not outcome.differences["/world_state"].is_none
@@ -213,8 +211,8 @@ def test_unmatched_messages_are_counted_and_the_first_difference_is_noted() -> N
     comparison = Comparison("game_state")
     comparison.add_recorded(1, 10, data, lambda: message)
     comparison.add_recorded(2, 20, data, lambda: message)
-    comparison.add_made(1, data, message)
-    comparison.add_made(3, data, message)
+    comparison.add_made(Made("game_state", 10, 1, message))
+    comparison.add_made(Made("game_state", 30, 3, message))
     comparison.finish()
     difference = comparison.difference
     assert (difference.equal, difference.pairs, difference.first, difference.unmatched) == (1, 1, 20, 0.5)

@@ -13,6 +13,7 @@ import numpy as np
 from tulip_description.planar import wrap_angle
 from tulip_ros import topics
 from tulip_ros.cdr import without_gaps
+from tulip_sim.recompute.heard import Made
 
 NEAR = math.radians(2.0)
 """Two features of a kind that are closer than this are the same one."""
@@ -74,30 +75,30 @@ class Comparison:
         self._type = next(topic.type_name for topic in topics.TOPICS if topic.name == name)
         self._measure = MEASURES.get(name)
         self._recorded: dict[int, deque[tuple[int, bytes, Any]]] = {}
-        self._made: dict[int, deque[tuple[bytes, Any]]] = {}
+        self._made: dict[int, deque[Made]] = {}
 
     def add_recorded(self, stamp: int, log_time: int, data: bytes, decode: Callable[[], Any]) -> None:
         """Take a recorded message; it is decoded only if it differs."""
         self.difference.recorded += 1
         waiting = self._made.get(stamp)
         if waiting:
-            self._compare(log_time, data, decode, *waiting.popleft())
+            self._compare(log_time, data, decode, waiting.popleft())
             if not waiting:
                 del self._made[stamp]
         else:
             self._recorded.setdefault(stamp, deque()).append((log_time, data, decode))
 
-    def add_made(self, stamp: int, data: bytes, message: Any) -> bool:
+    def add_made(self, made: Made) -> bool:
         """Take a recomputed message; return whether it has a recorded counterpart already that is equal."""
         self.difference.recomputed += 1
         equal = self.difference.equal
-        waiting = self._recorded.get(stamp)
+        waiting = self._recorded.get(made.stamp)
         if waiting:
-            self._compare(*waiting.popleft(), data, message)
+            self._compare(*waiting.popleft(), made)
             if not waiting:
-                del self._recorded[stamp]
+                del self._recorded[made.stamp]
         else:
-            self._made.setdefault(stamp, deque()).append((data, message))
+            self._made.setdefault(made.stamp, deque()).append(made)
         return self.difference.equal > equal
 
     def finish(self) -> None:
@@ -106,15 +107,15 @@ class Comparison:
         if times:
             self._note(min(times))
 
-    def _compare(self, log_time: int, data: bytes, decode: Callable[[], Any], made: bytes, message: Any) -> None:
+    def _compare(self, log_time: int, data: bytes, decode: Callable[[], Any], made: Made) -> None:
         difference = self.difference
         difference.pairs += 1
-        if data == made or self._same(data, made):
+        if data == made.data or self._same(data, made.data):
             difference.equal += 1
             return
         self._note(log_time)
         if self._measure is not None:
-            difference.see(self._measure(decode(), message))
+            difference.see(self._measure(decode(), made.message))
 
     def _same(self, data: bytes, made: bytes) -> bool:
         """Return whether two messages differ in nothing but the gaps between their numbers and behind the last one."""

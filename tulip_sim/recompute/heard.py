@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from rclpy.serialization import deserialize_message, serialize_message
 
+from tulip_ros import schemas, topics
 from tulip_ros.log_file import Log, Record
 from tulip_ros.serialized import time_at
 
@@ -52,21 +54,41 @@ class Heard:
         return time_at(self.record.data)
 
 
-@dataclass(frozen=True)
 class Made:
-    """A message that was computed anew.
+    """A message that was computed anew, as an object or as its bytes, each made of the other when it is asked for.
 
     Attributes:
         name: Of its topic, without the robot's namespace.
         log_time: Of the recorded message in whose place it stands [ns].
         stamp: Of its header [ns].
-        message: The message.
     """
 
-    name: str
-    log_time: int
-    stamp: int
-    message: Any
+    def __init__(self, name: str, log_time: int, stamp: int, message: Any = None, data: bytes = b"") -> None:
+        self.name, self.log_time, self.stamp = name, log_time, stamp
+        self._message, self._data = message, data
+
+    @property
+    def message(self) -> Any:
+        """The message."""
+        if self._message is None:
+            self._message = deserialize_message(self._data, schemas.message_class(_type_name(self.name)))
+        return self._message
+
+    @property
+    def data(self) -> bytes:
+        """The serialized message."""
+        if not self._data:
+            self._data = serialize_message(self._message)
+        return self._data
+
+    def __reduce__(self) -> tuple[type[Made], tuple[str, int, int, None, bytes]]:
+        """Go to another process as bytes."""
+        return Made, (self.name, self.log_time, self.stamp, None, self.data)
+
+
+@cache
+def _type_name(name: str) -> str:
+    return next(topic.type_name for topic in topics.TOPICS if topic.name == name)
 
 
 class Stage(Protocol):

@@ -7,19 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rclpy.serialization import serialize_message
-
 from tulip_description.frames import MAP
 from tulip_ros import schemas, topics
 from tulip_ros.bag import Bag
 from tulip_ros.errors import BadInputError, unknown
 from tulip_ros.log_edit import writing
-from tulip_ros.log_file import Log, LoggedTopic, Record
+from tulip_ros.log_file import Log, LoggedTopic
 from tulip_ros.serialized import after_header, time_at
 from tulip_sim.recompute.decisions import HeadStage, StrategyStage
-from tulip_sim.recompute.decoding import COMPRESSED, RAW, decoding_ahead
+from tulip_sim.recompute.decoding import COMPRESSED, RAW
 from tulip_sim.recompute.differences import Comparison, Difference
 from tulip_sim.recompute.heard import UNIX_TIME, Heard, Made, Stage
+from tulip_sim.recompute.line import Line
 from tulip_sim.recompute.settings import RobotParameters, parameters_of
 from tulip_sim.recompute.truth import Judge, Judgement
 from tulip_sim.recompute.vision import VisionStage
@@ -66,6 +65,7 @@ def recompute(
     parameter_files: Sequence[Path] = (),
     progress: Callable[[float], None] | None = None,
     judge: bool = True,
+    beside: bool = True,
 ) -> Outcome:
     """Compute components anew.
 
@@ -77,95 +77,105 @@ def recompute(
         parameter_files: YAML files that win over the parameters that the recording notes.
         progress: Told the recorded time passed [s].
         judge: Compare with the ground truth, where it is recorded.
+        beside: Compute in processes of their own, where there are cores for them.
 
     Raises:
         BadInputError: if a component is not known or its inputs are not recorded, if parameters cannot be used, or if
             the new recording cannot be written.
     """
-    robots = _robots(log, components, parameter_files, judge)
-    if folder is None:
-        return _run(log, robots, None, progress)
-    with writing(folder) as bag:
-        bag.copy_notes(log)
-        return _run(log, robots, bag, progress)
+    robots = _robots(log, components, parameter_files, judge, beside)
+    try:
+        if folder is None:
+            return _run(log, robots, None, progress)
+        with writing(folder) as bag:
+            bag.copy_notes(log)
+            return _run(log, robots, bag, progress)
+    finally:
+        for robot in robots:
+            robot.line.close()
 
 
 class _Robot:
-    """The stages of one robot, and the comparison of what they say."""
+    """The line of one robot, and the comparison of what it says."""
 
-    def __init__(self, log: Log, namespace: str, components: Sequence[str], p: RobotParameters, judge: bool) -> None:
+    def __init__(
+        self, log: Log, namespace: str, components: Sequence[str], p: RobotParameters, judge: bool, beside: bool
+    ) -> None:
         self.namespace, self._log = namespace, log
-        self.stages: list[Stage] = []
+        stages: list[Stage] = []
         self.pictures = ""
         if "vision" in components:
             self.pictures = _pictures(log, namespace)
-            self.stages.append(VisionStage(p.vision, self.pictures))
+            stages.append(VisionStage(p.vision, self.pictures))
         if "worldmodel" in components:
-            self.stages.append(WorldModelStage(p.worldmodel, p.field, p.start))
+            stages.append(WorldModelStage(p.worldmodel, p.field, p.start))
         if "strategy" in components:
-            self.stages.append(StrategyStage(p.strategy, p.field, p.game_input.stale_after))
+            stages.append(StrategyStage(p.strategy, p.field, p.game_input.stale_after))
         if "head" in components:
-            self.stages.append(HeadStage(p.head))
-        self.writes = frozenset().union(*(stage.writes for stage in self.stages))
-        self.reads = frozenset().union(*(stage.reads for stage in self.stages)) | self.writes
+            stages.append(HeadStage(p.head))
+        self._writes = frozenset().union(*(stage.writes for stage in stages))
+        self._flow = frozenset().union(*(stage.reads for stage in stages)) | self._writes
         # What was not recorded has nothing to be compared with; the new recording holds it all the same.
         self.comparisons = {
-            name: Comparison(name) for name in sorted(self.writes) if _full(namespace, name) in log.topics
+            name: Comparison(name) for name in sorted(self._writes) if _full(namespace, name) in log.topics
         }
         self.lossy = False
-        self.forgotten = p.forgotten
-        self.without_parameters = [name for name in components if name not in p.noted]
+        self._forgotten = p.forgotten
+        self._without_parameters = [name for name in components if name not in p.noted]
         has_truth = judge and _full(namespace, topics.GROUND_TRUTH.name) in log.topics
-        self.judge = Judge(p.field, self.writes) if has_truth else None
+        self.judge = Judge(p.field, self._writes) if has_truth else None
+        self.reads = self._flow | (self.judge.reads if self.judge else frozenset())
         self.bag: Bag | None = None
         self._topics: dict[str, LoggedTopic] = {}
+        self.line = Line(log.path, {_full(namespace, name): name for name in self._flow}, stages, beside)
 
-    def replaces(self, heard: Heard) -> bool:
+    def replaces(self, name: str, data: bytes) -> bool:
         """Return whether a recorded message is replaced by a recomputed one."""
-        if heard.name not in self.writes:
-            return False
         # Motion control says on the same topic where the body lies in odom.
-        return heard.name != topics.TF.name or _parent(heard.record.data) == MAP
+        return name in self._writes and (name != topics.TF.name or _parent(data) == MAP)
 
     def take(self, heard: Heard) -> None:
-        """Take a recorded message of one of the robot's topics."""
-        name = heard.name
-        if self.replaces(heard):
-            stamp = time_at(heard.record.data, FIRST) if name == topics.TF.name else heard.stamp
-            self.comparisons[name].add_recorded(stamp, heard.log_time, heard.record.data, lambda: heard.message)
+        """Take a recorded message of one of the robot's topics, and what the components say to it."""
+        name, record = heard.name, heard.record
+        if self.replaces(name, record.data):
+            stamp = time_at(record.data, FIRST) if name == topics.TF.name else heard.stamp
+            self.comparisons[name].add_recorded(stamp, record.log_time, record.data, lambda: heard.message)
         elif self.bag is not None:
-            record = heard.record
-            self.bag.write(record.topic.name, record.data, record.log_time, record.publish_time)
+            self.bag.copy(record)
         if self.judge is not None:
             self.judge.take_recorded(heard)
         if name == COMPRESSED and name == self.pictures and not self.lossy:
             self.lossy = "png" not in heard.message.format
-        for index, stage in enumerate(self.stages):
-            if name in stage.told_by:
-                self._spread(stage.answer(heard), index + 1)
-            elif name in stage.reads and name not in self.writes:
-                self._spread(stage.hear(heard), index + 1)
+        if name in self._flow:
+            self._spread(self.line.take())
 
     def finish(self) -> None:
-        """Take what stages still waited for."""
-        for index, stage in enumerate(self.stages):
-            self._spread(stage.finish(), index + 1)
+        """Take what the components still waited for."""
+        self._spread(self.line.take())
         for comparison in self.comparisons.values():
             comparison.finish()
 
-    def _spread(self, messages: Iterable[Made], first: int) -> None:
-        """Write and compare recomputed messages, and let the later stages hear them."""
+    def shortcomings(self) -> list[str]:
+        """Return what could not be computed as it was, in words; call it last."""
+        found = []
+        if self._forgotten:
+            names = ", ".join(self._forgotten)
+            found.append(f"{len(self._forgotten)} recorded parameters that no longer exist: {names}")
+        if self._without_parameters:
+            names = ", ".join(self._without_parameters)
+            found.append(f"no recorded parameters of {names}: today's defaults were taken")
+        found += [f"{count} {reason}" for reason, count in self.line.shortcomings().items()]
+        return [f"{self.namespace}: {line}" if self.namespace else line for line in found]
+
+    def _spread(self, messages: Iterable[Made]) -> None:
+        """Write, compare and judge recomputed messages."""
         for made in messages:
-            data = serialize_message(made.message)
             comparison = self.comparisons.get(made.name)
-            equal = comparison is not None and comparison.add_made(made.stamp, data, made.message)
+            equal = comparison is not None and comparison.add_made(made)
             if self.bag is not None:
-                self.bag.write(self._declared(made.name), data, made.log_time)
+                self.bag.write(self._declared(made.name), made.data, made.log_time)
             if self.judge is not None:
                 self.judge.take_made(made, equal)
-            for index in range(first, len(self.stages)):
-                if made.name in self.stages[index].reads:
-                    self._spread(self.stages[index].hear(made), index + 1)
 
     def _declared(self, name: str) -> str:
         """Return the full name of a topic of the new recording; its messages are of today's type."""
@@ -185,41 +195,20 @@ class _Robot:
 def _run(log: Log, robots: Sequence[_Robot], bag: Bag | None, progress: Callable[[float], None] | None) -> Outcome:
     routes: dict[str, tuple[_Robot, str]] = {}
     for robot in robots:
-        judged = robot.judge.reads if robot.judge else frozenset()
-        for name in robot.reads | judged:
+        for name in robot.reads:
             routes[_full(robot.namespace, name)] = (robot, name)
         robot.bag = bag
     begin, end = log.span
-    lockstep = begin < UNIX_TIME
-    copied: set[str] = set()
-    records = log.records(None if bag is not None else list(routes))
-    messages: Iterable[Heard] = (
-        Heard(routes[name][1] if (name := each.topic.name) in routes else name, each, log) for each in records
-    )
-    if any(robot.pictures == COMPRESSED for robot in robots):
-        messages = decoding_ahead(messages)
-    for number, heard in enumerate(messages):
-        record = heard.record
-        _declare(bag, copied, record, routes)
+    for number, record in enumerate(log.records(None if bag is not None else list(routes))):
         route = routes.get(record.topic.name)
         if route is not None:
-            route[0].take(heard)
+            route[0].take(Heard(route[1], record, log))
         elif bag is not None:
-            bag.write(record.topic.name, record.data, record.log_time, record.publish_time)
+            bag.copy(record)
         if progress is not None and number % PROGRESS == 0:
             progress((record.log_time - begin) * 1e-9)
-    shortcomings = []
     for robot in robots:
         robot.finish()
-        where = f"{robot.namespace}: " if robot.namespace else ""
-        if robot.forgotten:
-            names = ", ".join(robot.forgotten)
-            shortcomings.append(f"{where}{len(robot.forgotten)} recorded parameters that no longer exist: {names}")
-        if robot.without_parameters:
-            names = ", ".join(robot.without_parameters)
-            shortcomings.append(f"{where}no recorded parameters of {names}: today's defaults were taken")
-        for stage in robot.stages:
-            shortcomings += [f"{where}{count} {reason}" for reason, count in stage.shortcomings().items()]
     return Outcome(
         {
             _full(robot.namespace, name): comparison.difference
@@ -227,25 +216,14 @@ def _run(log: Log, robots: Sequence[_Robot], bag: Bag | None, progress: Callable
             for name, comparison in robot.comparisons.items()
         },
         {robot.namespace: robot.judge.judgements() for robot in robots if robot.judge is not None},
-        shortcomings,
-        lockstep,
+        [line for robot in robots for line in robot.shortcomings()],
+        begin < UNIX_TIME,
         any(robot.lossy for robot in robots),
         (end - begin) * 1e-9,
     )
 
 
-def _declare(bag: Bag | None, copied: set[str], record: Record, routes: Mapping[str, tuple[_Robot, str]]) -> None:
-    """Declare a topic that is copied, before its first message."""
-    name = record.topic.name
-    if bag is None or name in copied:
-        return
-    copied.add(name)
-    route = routes.get(name)
-    if route is None or route[1] not in route[0].writes or route[1] == topics.TF.name:
-        bag.copy_topic(record.topic)
-
-
-def _robots(log: Log, components: Sequence[str], files: Sequence[Path], judge: bool) -> list[_Robot]:
+def _robots(log: Log, components: Sequence[str], files: Sequence[Path], judge: bool, beside: bool) -> list[_Robot]:
     for component in components:
         if component not in COMPONENTS:
             raise unknown("component to recompute", component, COMPONENTS)
@@ -266,7 +244,7 @@ def _robots(log: Log, components: Sequence[str], files: Sequence[Path], judge: b
             f"Recording {log.path} lacks {', '.join(dict.fromkeys(missing))}, which {', '.join(components)} need;"
             " recompute other components, or record all topics."
         )
-    return [_Robot(log, space, components, parameters_of(log, space, files), judge) for space in chosen]
+    return [_Robot(log, space, components, parameters_of(log, space, files), judge, beside) for space in chosen]
 
 
 def _lacking(log: Log, namespace: str, components: Sequence[str]) -> list[str]:

@@ -43,6 +43,7 @@ class VisionStage:
             parameters: Of the core.
             pictures: Name of the topic with the pictures.
         """
+        self.pictures = pictures
         self.reads = frozenset((ODOMETRY, JOINTS, LENS, pictures))
         self._parameters = parameters
         self._robot = load_robot()
