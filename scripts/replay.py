@@ -154,10 +154,11 @@ def compare(
 ) -> Outcome:
     """Recompute, with a bar that shows how far it is."""
     columns = (TextColumn("recomputing"), BarColumn(bar_width=20), TextColumn("{task.completed:6.1f} s"))
-    with Progress(*columns, TimeElapsedColumn(), console=console, transient=True) as bar:
+    # Refreshed here, not by a thread of its own: with another thread, components could not have processes beside.
+    with Progress(*columns, TimeElapsedColumn(), console=console, transient=True, auto_refresh=False) as bar:
         first, last = log.span
         task = bar.add_task("", total=(last - first) * 1e-9)
-        progress: Callable[[float], None] = lambda done: bar.update(task, completed=done)  # noqa: E731
+        progress: Callable[[float], None] = lambda done: bar.update(task, completed=done, refresh=True)  # noqa: E731
         return recompute(log, components, folder, files, progress)
 
 

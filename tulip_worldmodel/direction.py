@@ -21,6 +21,11 @@ def wrap(angles: Array) -> Array:
     return np.asarray((angles + np.pi) % (2.0 * np.pi) - np.pi, dtype=np.float64)
 
 
+def half_turn(angles: Array) -> Array:
+    """Return directions of undirected lines [rad] brought into [-pi/2, pi/2)."""
+    return np.asarray((angles + np.pi / 2.0) % np.pi - np.pi / 2.0)
+
+
 def directions(offsets: Array) -> tuple[Array, Array]:
     """Return azimuth and elevation of points and how they change with the points.
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,8 +92,7 @@ class _Linearized:
     cost_false: float
 
 
-@dataclass(frozen=True)
-class _Hypothesis:
+class _Hypothesis(NamedTuple):
     """Choices for the features so far, and the state after them as an offset from the prior."""
 
     cost: float
@@ -103,8 +102,7 @@ class _Hypothesis:
     taken: frozenset[object]
 
 
-@dataclass(frozen=True)
-class _Child:
+class _Child(NamedTuple):
     """A hypothesis continued with one choice: a position among the feature's candidates, or FALSE."""
 
     cost: float

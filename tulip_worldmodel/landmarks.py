@@ -1,9 +1,4 @@
-"""What the robot should see of the field from a pose, and how that changes with the pose.
-
-State of localization, (7,): x, y [m], yaw [rad] of base_footprint in map; the small rotation w about the x, y and
-z axes of base_footprint [rad] by which the camera's pose errs (camera_error.py); and the heading drift [rad/s] that
-dead reckoning misses.
-"""
+"""What the robot should see of the field from a state of localization (landmark_geometry.py)."""
 
 from __future__ import annotations
 
@@ -16,14 +11,12 @@ from numpy.typing import NDArray
 
 from tulip_description.field import CrossingKind, Field, LineSegment
 from tulip_vision.features import Feature, FeatureClass
-from tulip_worldmodel.camera_error import by_turn, turned
-from tulip_worldmodel.direction import directions, meet_plane, rays, wrap
+from tulip_worldmodel.direction import wrap
+from tulip_worldmodel.landmark_geometry import STATES, line_misfits, piece_on_ground, point_directions
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-STATES = 7
-ERROR = slice(3, 6)  # of the state: the camera pose's error w
 CROSSINGS = {
     FeatureClass.CROSSING_L: CrossingKind.L,
     FeatureClass.CROSSING_T: CrossingKind.T,
@@ -52,12 +45,6 @@ class Lines:
     along: Array
     across: Array
     starts: Array
-
-    def __getitem__(self, chosen: Indices) -> Lines:
-        """Return some of the lines."""
-        return Lines(
-            self.directions[chosen], self.lengths[chosen], self.along[chosen], self.across[chosen], self.starts[chosen]
-        )
 
 
 def lines_of(segments: Sequence[LineSegment]) -> Lines:
@@ -122,119 +109,6 @@ def has_side(place: Array, points: Array, mates: Array, side: int) -> NDArray[np
     to_post, to_mate = points - place, mates - place
     left = to_post[:, 0] * to_mate[:, 1] - to_post[:, 1] * to_mate[:, 0] < 0.0  # its mate is to the right of it
     return left if side > 0 else ~left
-
-
-def point_directions(state: Array, points: Array, camera_position: Array) -> tuple[Array, Array]:
-    """Return under which angles places on the ground appear.
-
-    Args:
-        state: (7,) see the module.
-        points: (n, 2) in map [m].
-        camera_position: (3,) optical centre in base_footprint [m].
-
-    Returns:
-        (n, 2) azimuth and elevation [rad], and (n, 2, 7) their derivatives by the state.
-    """
-    yaw = state[2]
-    c, s = math.cos(yaw), math.sin(yaw)
-    to_footprint = np.array([[c, s], [-s, c]])
-    relative = (points - state[:2]) @ to_footprint.T
-    offset = np.empty((len(points), 3))
-    offset[:, :2] = relative - camera_position[:2]
-    offset[:, 2] = -camera_position[2]
-    by_state = np.zeros((len(points), 3, STATES))
-    by_state[:, :2, :2] = -to_footprint
-    by_state[:, 0, 2] = relative[:, 1]
-    by_state[:, 1, 2] = -relative[:, 0]
-    turn = turned(state[ERROR])
-    by_state = turn @ by_state
-    by_state[:, :, ERROR] = by_turn(offset)
-    angles, by_offset = directions(offset @ turn.T)
-    return angles, by_offset @ by_state
-
-
-@dataclass(frozen=True)
-class LineMisfits:
-    """How an observed piece of line lies relative to n lines of the field.
-
-    Attributes:
-        misfits: (n, 2) angle between the two [rad, in [-pi/2, pi/2)] and distance of the piece's middle from the
-            line [m].
-        by_state: (n, 2, 7) derivatives of the misfits by the state.
-        by_angles: (n, 2, 4) by azimuth and elevation of the first and the second end.
-        along: (n, 2) where both ends lie along the line, from its start [m].
-    """
-
-    misfits: Array
-    by_state: Array
-    by_angles: Array
-    along: Array
-
-
-class LinePiece:
-    """An observed piece of line, with what does not depend on the state."""
-
-    def __init__(self, ends: Array, camera_position: Array) -> None:
-        """Prepare a piece.
-
-        Args:
-            ends: (2, 2) azimuth and elevation of both ends [rad], below the horizon.
-            camera_position: (3,) optical centre in base_footprint [m].
-        """
-        self._camera_position = camera_position
-        self._rays, self._rays_by_angles = rays(ends)
-        self._rays_by_error = -by_turn(self._rays)
-
-    def ground_ends(self) -> Array:
-        """Return (2, 2) both ends on the ground in base_footprint [m], as the camera's pose has it."""
-        return meet_plane(self._rays, self._camera_position)[0]
-
-    def along(self, state: Array, lines: Lines) -> Array:
-        """Return where both ends lie along lines, (n, 2) from their starts [m]."""
-        points = meet_plane(self._rays @ turned(-state[ERROR]).T, self._camera_position)[0]
-        in_map = points @ _rotation(state[2]).T + state[:2]
-        return np.asarray(lines.along @ in_map.T - lines.starts[:, :1])
-
-    def misfits(self, state: Array, lines: Lines) -> LineMisfits:
-        """Return how the piece lies relative to lines, seen from a state (7,)."""
-        back = turned(-state[ERROR])
-        points, points_by_rays = meet_plane(self._rays @ back.T, self._camera_position)
-        points_by_error = points_by_rays @ self._rays_by_error
-        points_by_angles = points_by_rays @ (back @ self._rays_by_angles)
-        rotation = _rotation(state[2])
-        in_map = points @ rotation.T + state[:2]
-        piece = points[1] - points[0]
-        middle = 0.5 * (points[0] + points[1])
-        across = lines.across @ rotation  # in base_footprint
-
-        count = len(across)
-        misfits = np.empty((count, 2))
-        misfits[:, 0] = half_turn(math.atan2(piece[1], piece[0]) + state[2] - lines.directions)
-        misfits[:, 1] = lines.across @ (0.5 * (in_map[0] + in_map[1])) - lines.starts[:, 1]
-        turn = np.array([-piece[1], piece[0]]) / max(float(piece @ piece), 1e-6)  # angle by the second end
-        by_state = np.zeros((count, 2, STATES))
-        by_state[:, 0, 2] = 1.0
-        by_state[:, 0, ERROR] = turn @ (points_by_error[1] - points_by_error[0])
-        by_state[:, 1, :2] = lines.across
-        by_state[:, 1, 2] = across @ np.array([-middle[1], middle[0]])
-        by_state[:, 1, ERROR] = across @ (0.5 * (points_by_error[0] + points_by_error[1]))
-        by_angles = np.empty((count, 2, 4))
-        by_angles[:, 0, :2] = -turn @ points_by_angles[0]
-        by_angles[:, 0, 2:] = turn @ points_by_angles[1]
-        by_angles[:, 1, :2] = across @ (0.5 * points_by_angles[0])
-        by_angles[:, 1, 2:] = across @ (0.5 * points_by_angles[1])
-        return LineMisfits(misfits, by_state, by_angles, lines.along @ in_map.T - lines.starts[:, :1])
-
-
-def _rotation(yaw: float) -> Array:
-    """Return (2, 2) from base_footprint to map."""
-    c, s = math.cos(yaw), math.sin(yaw)
-    return np.array([[c, -s], [s, c]])
-
-
-def half_turn(angles: Array) -> Array:
-    """Return directions of undirected lines [rad] brought into [-pi/2, pi/2)."""
-    return np.asarray((angles + math.pi / 2.0) % math.pi - math.pi / 2.0)
 
 
 class PointObservation:
@@ -307,8 +181,8 @@ class LineObservation:
         """Remember what was seen; arguments as of `PointObservation`."""
         self.feature = feature
         self._lines = lines
-        ends = np.array([[feature.azimuth, feature.elevation], [feature.end_azimuth, feature.end_elevation]])
-        self._piece = LinePiece(ends, camera_position)
+        self._camera_position = camera_position
+        self._ends = np.array([[feature.azimuth, feature.elevation], [feature.end_azimuth, feature.end_elevation]])
         self._line_spread = landmark_spread
         self._angles_noise = np.square([feature.azimuth_spread, feature.elevation_spread] * 2)
 
@@ -318,19 +192,21 @@ class LineObservation:
 
     def possible(self, state: Array) -> Indices:
         """Return the lines along which the whole piece lies."""
-        along = self._piece.along(state, self._lines)
-        inside = (along > -self.OVERHANG) & (along < self._lines.lengths[:, None] + self.OVERHANG)
+        lines = self._lines
+        along = line_misfits(state, self._ends, self._camera_position, lines.directions, lines.starts)[3]
+        inside = (along > -self.OVERHANG) & (along < lines.lengths[:, None] + self.OVERHANG)
         return np.flatnonzero(inside[:, 0] & inside[:, 1])
 
     def ground_ends(self) -> Array:
-        """Return (2, 2) both ends on the ground in base_footprint [m]."""
-        return self._piece.ground_ends()
+        """Return (2, 2) both ends on the ground in base_footprint [m], as the camera's pose has it."""
+        return np.asarray(piece_on_ground(np.zeros(STATES), self._ends, self._camera_position)[0])
 
     def linearize(self, state: Array, candidates: Indices) -> tuple[Array, Array, Array]:
         """Return innovations (k, 2), their Jacobians (k, 2, 7) and noise (k, 2, 2) of some candidates."""
-        found = self._piece.misfits(state, self._lines[candidates])
-        noise = (found.by_angles * self._angles_noise) @ found.by_angles.transpose(0, 2, 1)
-        length = np.maximum(np.abs(found.along[:, 1] - found.along[:, 0]), 0.1)
+        directions, starts = self._lines.directions[candidates], self._lines.starts[candidates]
+        misfits, by_state, by_angles, along = line_misfits(state, self._ends, self._camera_position, directions, starts)
+        noise = (by_angles * self._angles_noise) @ by_angles.transpose(0, 2, 1)
+        length = np.maximum(np.abs(along[:, 1] - along[:, 0]), 0.1)
         noise[:, 0, 0] += 2.0 * (self._line_spread / length) ** 2
         noise[:, 1, 1] += self._line_spread**2
-        return -found.misfits, found.by_state, noise
+        return -misfits, by_state, noise

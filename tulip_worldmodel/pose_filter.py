@@ -1,8 +1,8 @@
 """One hypothesis of where the robot is: an extended Kalman filter over dead reckoning and landmarks.
 
-State: x, y [m], yaw [rad] of base_footprint in map, the error of the camera's pose as a small rotation [rad], and the
-drift of the heading [rad/s] (see landmarks.py). A swaying trunk misjudged by half a degree moves every far feature by
-decimetres in the same direction: the camera's error carries that (camera_error.py). The drift is the bias of the IMU.
+State (landmark_geometry.py): x, y [m], yaw [rad] of base_footprint in map, the error of the camera's pose as a small
+rotation [rad], and the drift of the heading [rad/s]. A swaying trunk misjudged by half a degree moves every far feature
+by decimetres in the same direction: the camera's error carries that (camera_error.py). The drift is the bias of the IMU.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from tulip_description.planar import Pose2D, wrap_angle
 from tulip_vision.features import Feature, FeatureClass
 from tulip_worldmodel.camera_error import CameraErrorParameters
 from tulip_worldmodel.landmark_association import Observation, associate
-from tulip_worldmodel.landmarks import CROSSINGS, ERROR, STATES
+from tulip_worldmodel.landmark_geometry import ERROR, STATES
+from tulip_worldmodel.landmarks import CROSSINGS
 from tulip_worldmodel.localization_parameters import LocalizationParameters
 from tulip_worldmodel.lost import LostDetector
 from tulip_worldmodel.mahalanobis import diagonal, distances_and_determinants, gate

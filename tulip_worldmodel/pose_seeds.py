@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from tulip_description.field import Field
 from tulip_description.planar import Pose2D, wrap_angle
 from tulip_vision.features import Feature, FeatureClass, Features
-from tulip_worldmodel.direction import HORIZON, wrap
-from tulip_worldmodel.landmarks import Landmarks, half_turn, landmarks_of
+from tulip_worldmodel.direction import HORIZON, half_turn, wrap
+from tulip_worldmodel.landmarks import Landmarks, landmarks_of
 from tulip_worldmodel.localization_parameters import LocalizationParameters
 
 Array = NDArray[np.float64]

@@ -18,6 +18,7 @@ from tulip_motion.interface import Odometry
 from tulip_vision.features import Features
 from tulip_worldmodel.ball_filter import BallFilter, BallParameters
 from tulip_worldmodel.camera_error import CameraErrorParameters
+from tulip_worldmodel.landmark_geometry import rehearse
 from tulip_worldmodel.localization import Localization
 from tulip_worldmodel.localization_parameters import LocalizationParameters
 from tulip_worldmodel.moving_point import PointEstimate
@@ -64,6 +65,7 @@ class WorldModel:
             field: The field played on.
             start: base_footprint in map when the first odometry comes.
         """
+        rehearse()
         self._parameters = parameters
         self._localization = Localization(parameters.localization, field, start, parameters.camera)
         self._ball = BallFilter(parameters.ball, field.ball_radius, parameters.camera)

@@ -9,15 +9,14 @@ from hypothesis import strategies as st
 
 from tulip_description.field import LineSegment, load_field
 from tulip_vision.features import Feature, FeatureClass
-from tulip_worldmodel.direction import directions, meet_plane, rays
+from tulip_worldmodel.direction import directions, half_turn, meet_plane, rays
+from tulip_worldmodel.landmark_geometry import line_misfits, piece_on_ground, point_directions
 from tulip_worldmodel.landmarks import (
-    LinePiece,
+    Lines,
     PointObservation,
-    half_turn,
     has_side,
     landmarks_of,
     lines_of,
-    point_directions,
 )
 
 CAMERA = np.array([0.05, 0.02, 1.15])
@@ -44,6 +43,10 @@ def numeric(function, at: np.ndarray) -> np.ndarray:
     return np.stack(columns, axis=-1)
 
 
+def misfits_of(state: np.ndarray, ends: np.ndarray, lines: Lines) -> tuple[np.ndarray, ...]:
+    return line_misfits(state, ends, CAMERA, lines.directions, lines.starts)
+
+
 @settings(max_examples=60, deadline=None)
 @given(state=states, place=st.tuples(st.floats(-5.0, 5.0), st.floats(-4.0, 4.0)))
 def test_jacobian_of_point_directions_agrees_with_finite_differences(state, place) -> None:
@@ -66,14 +69,14 @@ def test_jacobians_of_line_misfit_agree_with_finite_differences(state, ends) -> 
     azimuth, elevation, width, end_elevation = ends
     seen = np.array([[azimuth, elevation], [azimuth + width, end_elevation]])
     lines = lines_of([LineSegment((1.0, -2.0), (-2.0, 1.0)), LineSegment((3.0, -2.0), (3.0, 2.0))])
-    found = LinePiece(seen, CAMERA).misfits(state, lines)
-    by_state = numeric(lambda x: LinePiece(seen, CAMERA).misfits(x, lines).misfits, state)
-    by_angles = numeric(lambda z: LinePiece(z.reshape(2, 2), CAMERA).misfits(state, lines).misfits, seen.ravel())
+    misfits, by_state, by_angles, _ = misfits_of(state, seen, lines)
+    expected_by_state = numeric(lambda x: misfits_of(x, seen, lines)[0], state)
+    expected_by_angles = numeric(lambda z: misfits_of(state, z.reshape(2, 2), lines)[0], seen.ravel())
     for line in range(2):
-        if abs(found.misfits[line, 0]) > 1.56:
+        if abs(misfits[line, 0]) > 1.56:
             continue  # the direction's wrap is not differentiable
-        assert np.allclose(found.by_state[line], by_state[line], rtol=1e-4, atol=1e-5)
-        assert np.allclose(found.by_angles[line], by_angles[line], rtol=1e-4, atol=1e-4)
+        assert np.allclose(by_state[line], expected_by_state[line], rtol=1e-4, atol=1e-5)
+        assert np.allclose(by_angles[line], expected_by_angles[line], rtol=1e-4, atol=1e-4)
 
 
 @given(azimuth=st.floats(-3.1, 3.1), elevation=st.floats(-1.4, -0.1), height=st.floats(0.0, 0.2))
@@ -97,11 +100,18 @@ def test_piece_on_the_line_has_no_misfit_in_either_order_of_its_ends() -> None:
     state = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 0.0])
     seen, _ = point_directions(state, np.array([[2.0, -1.0], [2.0, 1.5]]), CAMERA)
     for ends in (seen, seen[::-1]):
-        piece = LinePiece(ends, CAMERA)
-        found = piece.misfits(state, lines)
-        assert found.misfits[0] == pytest.approx([0.0, 0.0], abs=1e-9)
-        assert sorted(found.along[0]) == pytest.approx([1.0, 3.5])
-        assert piece.along(state, lines) == pytest.approx(found.along)
+        misfits, _, _, along = misfits_of(state, ends.copy(), lines)
+        assert misfits[0] == pytest.approx([0.0, 0.0], abs=1e-9)
+        assert sorted(along[0]) == pytest.approx([1.0, 3.5])
+
+
+def test_seen_points_on_the_ground_are_where_a_tilted_camera_sees_them() -> None:
+    state = np.array([0.0, 0.0, 0.0, 0.02, -0.03, 0.01, 0.0])  # base_footprint is map
+    places = np.array([[2.0, -1.0], [3.0, 1.5]])
+    seen, _ = point_directions(state, places, CAMERA)
+    # To turn there by v + w x v and back by v - w x v misses by the square of w: 1.4e-3 of some 3 m.
+    assert piece_on_ground(state, seen, CAMERA)[0] == pytest.approx(places, abs=0.02)
+    assert abs(piece_on_ground(np.zeros(7), seen, CAMERA)[0] - places).max() > 0.1
 
 
 @given(st.floats(-20.0, 20.0))
