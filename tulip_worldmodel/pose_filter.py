@@ -2,7 +2,7 @@
 
 State (landmark_geometry.py): x, y [m], yaw [rad] of base_footprint in map, the error of the camera's pose as a small
 rotation [rad], and the drift of the heading [rad/s]. A swaying trunk misjudged by half a degree moves every far feature
-by decimetres in the same direction: the camera's error carries that (camera_error.py). The drift is the bias of the IMU.
+by decimetres in the same direction: the camera's error carries that (camera_error.py). The drift is the IMU's bias.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ def test_an_error_in_the_other_process_is_raised_here_after_the_items_before() -
 
     beside = Beside(items())
     assert [next(beside) for _ in range(BATCH)] == list(range(BATCH))
-    with pytest.raises(DamagedLogError, match="Recording run is cut. Mend it first"):
+    with pytest.raises(DamagedLogError, match=r"Recording run is cut\. Mend it first"):
         next(beside)
     beside.close()
 
