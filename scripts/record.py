@@ -41,6 +41,9 @@ def main(
     compression: Annotated[
         str, typer.Option(help=f"{' or '.join(COMPRESSIONS)}; none is faster, for raw pictures of many cameras.")
     ] = "zstd",
+    sync: Annotated[
+        bool, typer.Option(help="Have the disk keep what is written, so that a loss of power costs a second.")
+    ] = True,
     split_size: Annotated[float, typer.Option(help="MB after which the next file is begun; 0 for one file.")] = 0.0,
     split_time: Annotated[float, typer.Option(help="Seconds after which the next file is begun; 0: never.")] = 0.0,
     wait: Annotated[
@@ -60,6 +63,7 @@ def main(
             pictures=pictures,
             picture_rate=picture_rate,
             compression=compression,
+            sync=sync,
             split_size=split_size,
             split_time=split_time,
         )

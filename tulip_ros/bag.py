@@ -81,7 +81,14 @@ class Bag:
     latched topics, which are marked so that `Log` reads them once.
     """
 
-    def __init__(self, folder: Path, split: Split | None = None, free: int = FREE, compression: str = "zstd") -> None:
+    def __init__(
+        self,
+        folder: Path,
+        split: Split | None = None,
+        free: int = FREE,
+        compression: str = "zstd",
+        sync: bool = True,
+    ) -> None:
         """Begin a recording.
 
         Args:
@@ -89,6 +96,7 @@ class Bag:
             split: When to go on in a new file; None for never.
             free: Disk space to leave free [B].
             compression: "zstd", or "none": three times as fast for raw pictures, and twice as large.
+            sync: Have the disk keep what is written, so that a loss of power costs a second.
 
         Raises:
             BadInputError: if the folder holds something, cannot be written, or too little disk space is free.
@@ -96,7 +104,7 @@ class Bag:
         self.folder = folder
         self._split = split or Split()
         self._free = free
-        self._compression = compression
+        self._compression, self._sync = compression, sync
         self._parts: list[_Part] = []
         self._topics: dict[str, _Topic] = {}
         self._schemas: dict[tuple[str, str], Schema] = {}
@@ -341,7 +349,8 @@ class Bag:
 
     def _begin(self) -> _Part:
         number = f"_{len(self._parts)}" if self._split else ""
-        part = _Part(McapFile(self.folder / f"{self.folder.name}{number}.mcap", compression=self._compression))
+        path = self.folder / f"{self.folder.name}{number}.mcap"
+        part = _Part(McapFile(path, compression=self._compression, sync=self._sync))
         self._parts.append(part)
         return part
 

@@ -87,13 +87,14 @@ class McapFile:
     A record that does not fit on the disk any more is taken back, so the file ends with a whole record at any time.
     """
 
-    def __init__(self, path: Path, library: str = LIBRARY, compression: str = "zstd") -> None:
+    def __init__(self, path: Path, library: str = LIBRARY, compression: str = "zstd", sync: bool = True) -> None:
         """Begin the file.
 
         Args:
             path: Of the new file.
             library: Name of the program that writes it.
             compression: Of chunks: one of `COMPRESSIONS`.
+            sync: Whether `sync` does anything.
 
         Raises:
             OSError: if it exists, or cannot be written.
@@ -110,6 +111,7 @@ class McapFile:
         self._metadata: list[MetadataIndex] = []
         self._attachments: list[AttachmentIndex] = []
         self._compressor = zstandard.ZstdCompressor(level=LEVEL) if compression == "zstd" else None
+        self._syncs = sync
         self._stream = open(path, "xb", buffering=0)
         self._append(MAGIC, encode(Header(Profile.ROS2, library)))
 
@@ -243,7 +245,8 @@ class McapFile:
         Raises:
             OSError: if the disk refuses.
         """
-        os.fdatasync(self._stream.fileno())
+        if self._syncs:
+            os.fdatasync(self._stream.fileno())
 
     def finish(self) -> None:
         """Write the index and close the file; without room for the index the file stays open, and whole but for it.

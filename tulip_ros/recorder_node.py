@@ -52,6 +52,7 @@ class RecorderParameters:
         pictures: "compressed" (10 KB each), "raw" (0.9 MB), "both" or "none".
         picture_rate: How many of each topic's pictures go into a second of the recording, by their stamps; 0: all.
         compression: Of the files: "zstd", or "none" for raw pictures of many cameras.
+        sync: Have the disk keep what is written; without, a loss of power costs what the system had not written yet.
         split_size: Size of a file after which the recording goes on in another one [MB]; 0 for one file.
         split_time: Time in a file after which the recording goes on in another one [s]; 0 for one file.
         free_space: Disk space to leave free [MB].
@@ -68,6 +69,7 @@ class RecorderParameters:
     pictures: str = "compressed"
     picture_rate: float = PICTURE_RATE
     compression: str = "zstd"
+    sync: bool = True
     split_size: float = 0.0
     split_time: float = 0.0
     free_space: float = FREE / 1e6
@@ -174,7 +176,7 @@ class RecorderNode(ComponentNode):
         if from_now:
             self.take()
         split = Split(int(settings.split_size * 1e6), settings.split_time)
-        bag = Bag(folder.absolute(), split, int(settings.free_space * 1e6), settings.compression)
+        bag = Bag(folder.absolute(), split, int(settings.free_space * 1e6), settings.compression, settings.sync)
         try:
             own = dict(note.split("=", 1) for note in settings.notes)
             log_notes.explain(bag, {**own, "time": "of reception, in ns since 1970"})

@@ -13,7 +13,8 @@ from tulip_sim.bench.runner import Bench, Row
 SHARE, SIZE, LOSS = 0.10, 150.0, 1.0  # asked for: of a core; [MB] of 10 minutes; [s] lost at most
 LATE = 2.0  # [ms] asked for
 KILLS = 20
-WRITERS = ("ours", "rosbags kept", "rosbags")
+WRITERS = {"ours": "ours", "rosbags kept": "ours", "ours not kept": "ours not kept", "rosbags": "ours not kept"}
+"""With the one that each is compared with."""
 PARTS: dict[str, Callable[..., Row]] = {
     "match": log_match.measure,
     "throughput": log_throughput.measure,
@@ -81,21 +82,22 @@ def _throughput(rows: list[Row]) -> list[str]:
     lines = [
         f"Writers in turns in one process, median of {log_throughput.ROUNDS} rounds, with the file's end; compressed"
         " with zstd, as recordings are, and not compressed. Ours has the disk keep what is written, all the time, so"
-        " that a loss of power costs a second; rosbags' writer never asks for that: `kept` is rosbags with one such"
-        " request at the end. Asked for: at least as fast.",
+        " that a loss of power costs a second; rosbags' writer never asks for that. So it is compared with one such"
+        " request at its end (`kept`), and as it is with ours told not to ask (`not kept`, `record.py --no-sync`)."
+        " Asked for: at least as fast.",
         "",
         "| messages | writer | zstd | of ours | not compressed | of ours |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for row in rows:
         what = f"{row['messages']} {row['kind']} of {row['bytes each']} B"
-        for name in WRITERS:
+        for name, ours in WRITERS.items():
             cells = []
             for suffix in (" zstd", ""):
                 speed = row[f"{name}{suffix} [1/s]"]
                 megabytes = f"{row[f'{name}{suffix} [MB/s]']:.0f} MB/s, {row[f'{name}{suffix} [MB written]']:.0f} MB"
-                cells += [f"{speed} / s, {megabytes}", f"{speed / row[f'ours{suffix} [1/s]']:.2f}"]
-            lines.append(f"| {what} | {name.replace(' kept', ', kept')} | {' | '.join(cells)} |")
+                cells += [f"{speed} / s, {megabytes}", f"{speed / row[f'{ours}{suffix} [1/s]']:.2f}"]
+            lines.append(f"| {what} | {name.replace(' ', ', ', 1)} | {' | '.join(cells)} |")
             what = ""
     return lines
 

@@ -43,7 +43,12 @@ def measure(kind: str) -> Row:
     writers: dict[str, Callable[[Path, list[bytes], topics.Topic], None]] = {
         f"{name}{suffix}": partial(write, compressed=bool(suffix))
         for suffix in (" zstd", "")
-        for name, write in (("ours", _ours), ("rosbags kept", _rosbags_kept), ("rosbags", _rosbags))
+        for name, write in (
+            ("ours", partial(_ours, sync=True)),
+            ("ours not kept", partial(_ours, sync=False)),
+            ("rosbags kept", _rosbags_kept),
+            ("rosbags", _rosbags),
+        )
     }
     times: dict[str, list[float]] = {name: [] for name in writers}
     sizes: dict[str, int] = {}
@@ -98,8 +103,8 @@ def _repeated(data: list[bytes], count: int) -> list[bytes]:
 MAKERS = {"small messages": _joint_states, "pictures": _pictures, "raw pictures": _raw_pictures}
 
 
-def _ours(folder: Path, messages: list[bytes], topic: topics.Topic, compressed: bool) -> None:
-    bag = Bag(folder, free=0, compression="zstd" if compressed else "none")
+def _ours(folder: Path, messages: list[bytes], topic: topics.Topic, compressed: bool, sync: bool) -> None:
+    bag = Bag(folder, free=0, compression="zstd" if compressed else "none", sync=sync)
     bag.add_topic(f"/{topic.name}", topic.type_name, topic.quality)
     for number, data in enumerate(messages):
         bag.write(f"/{topic.name}", data, number * 1_000_000)
