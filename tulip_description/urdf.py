@@ -5,16 +5,8 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 from tulip_description import frames
+from tulip_description.paint import COLOURS
 from tulip_description.robot import Box, Link, Robot, Vector
-
-COLOURS: dict[str, tuple[float, float, float]] = {
-    "grey": (0.72, 0.72, 0.74),
-    "black": (0.08, 0.08, 0.09),
-    "cyan": (0.0, 0.75, 0.85),
-    "magenta": (0.85, 0.1, 0.65),
-}
-"""Red, green and blue, 0 to 1, of the colour names of `Box`."""
-
 
 def build_urdf(robot: Robot, marker: str = "cyan", mount_frames: bool = True) -> str:
     """Return the robot as URDF.

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from tulip_description.materials import Materials
+
 
 @dataclass(frozen=True)
 class SensorParameters:
@@ -151,3 +153,23 @@ class WorldParameters:
         return cls(
             friction=(0.8, 0.8), mass_spread=0.0, joint_friction=(0.0, 0.0), sensor_delay=(0, 0), sensors=sensors
         )
+
+
+def materials_of(parameters: WorldParameters, friction: float | None = None) -> Materials:
+    """Return what a world is made of.
+
+    Args:
+        parameters: Of the world.
+        friction: Of its carpet, as drawn; None for the middle of the range. Joint friction is the middle of its range.
+    """
+    p = parameters
+    return Materials(
+        friction=sum(p.friction) / 2 if friction is None else friction,
+        ball_mass=p.ball_mass,
+        ball_rolling_deceleration=p.ball_rolling_deceleration,
+        ball_stiffness=p.ball_stiffness,
+        ball_damping=p.ball_damping,
+        net_stiffness=p.net_stiffness,
+        net_damping=p.net_damping,
+        joint_friction=sum(p.joint_friction) / 2,
+    )
