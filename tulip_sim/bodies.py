@@ -11,9 +11,6 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tulip_description.field import Field, Goal
 from tulip_description.field_solids import goal_frame, net_walls
 from tulip_description.keeper import KeeperPart, keeper_parts
@@ -24,7 +21,6 @@ from tulip_description.urdf import build_urdf
 from tulip_sim.parameters import WorldParameters, materials_of
 from tulip_sim.physics import pybullet
 
-Array = NDArray[np.float64]
 
 QUIET = {
     "restitution": 0.0,
@@ -128,13 +124,12 @@ def move_figure(client: int, body: int, pose: Pose2D) -> None:
     pybullet.resetBasePositionAndOrientation(body, [pose.x, pose.y, 0.0], turn, physicsClientId=client)
 
 
-def add_robot(client: int, robot: Robot, scale: Array) -> tuple[int, dict[str, int]]:
+def add_robot(client: int, robot: Robot) -> tuple[int, dict[str, int]]:
     """Load the robot, floating, all joints without motors.
 
     Args:
         client: Physics engine.
         robot: What to load.
-        scale: (links,) factors on each link's mass and inertia, order of `robot.links`.
 
     Returns:
         The body, and the pybullet index of each link and joint by name (base_link: -1; a joint: that of its child).
@@ -155,13 +150,13 @@ def add_robot(client: int, robot: Robot, scale: Array) -> tuple[int, dict[str, i
     for number in range(pybullet.getNumJoints(body, physicsClientId=client)):
         info = pybullet.getJointInfo(body, number, physicsClientId=client)
         index[info[1].decode()] = index[info[12].decode()] = number
-    for link, factor in zip(robot.links, scale, strict=True):
+    for link in robot.links:
         # Loading zeroes inertias that no body can have, as some of the table; changeDynamics takes them as they are.
         pybullet.changeDynamics(
             body,
             index[link.name],
-            mass=link.mass * float(factor),
-            localInertiaDiagonal=[moment * float(factor) for moment in link.inertia],
+            mass=link.mass,
+            localInertiaDiagonal=list(link.inertia),
             lateralFriction=SOLE_FRICTION,
             jointDamping=0.0,
             **QUIET,

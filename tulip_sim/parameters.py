@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 
 from tulip_description.materials import Materials
 
+ENGINES = ("pybullet", "mujoco")
+"""Physics engines that can stand behind a world."""
+
 
 @dataclass(frozen=True)
 class SensorParameters:
@@ -84,6 +87,7 @@ class DriverParameters:
 class WorldParameters:
     """The physical world. Ranges are drawn from once, when a world is made, by its seed."""
 
+    engine: str = "pybullet"  # or mujoco, the project's extra of that name
     friction: tuple[float, float] = (0.6, 1.0)  # range of the friction coefficient on the carpet
     mass_scale: float = 1.0  # all masses and inertias by those of the robot file, that motion control does not know of
     mass_spread: float = 0.05  # each link's mass and inertia: +- this share
@@ -106,6 +110,8 @@ class WorldParameters:
         Raises:
             ValueError: if one is out of its range.
         """
+        if self.engine not in ENGINES:
+            raise ValueError(f"engine is {self.engine!r}; expected {' or '.join(ENGINES)}")
         for name in ("friction", "joint_friction", "sensor_delay"):
             low, high = getattr(self, name)
             if not 0.0 <= low <= high:
