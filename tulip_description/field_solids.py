@@ -12,6 +12,7 @@ from tulip_description.field import Field, Goal
 from tulip_description.robot import Box, Vector
 
 NET_THICKNESS = 0.10  # [m] thick enough that a ball of 10 m/s does not pass through it between two steps
+CARPET_THICKNESS = 0.02  # [m] of carpets that are boxes; an engine with planes has no use for it
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,12 @@ class Pipe:
     length: float
     upright: bool
     colour: str
+
+
+def carpet_box(field: Field) -> Box:
+    """Return the carpet as a box whose upper side is the ground."""
+    size = (field.carpet_length, field.carpet_width, CARPET_THICKNESS)
+    return Box(size, (0.0, 0.0, -CARPET_THICKNESS / 2), "green", True)
 
 
 def goal_name(goal: Goal) -> str:
@@ -121,7 +128,9 @@ def painted_strips(field: Field) -> tuple[Strip, ...]:
         )
         for line in field.line_segments
     ]
-    strips += [Strip(x, y, yaw, field.penalty_mark_size, width) for x, y in field.penalty_marks for yaw in (0.0, math.pi / 2)]
+    strips += [
+        Strip(x, y, yaw, field.penalty_mark_size, width) for x, y in field.penalty_marks for yaw in (0.0, math.pi / 2)
+    ]
     radius = field.centre_circle.radius
     for number in range(CIRCLE_STRIPS):
         angle = 2.0 * math.pi * number / CIRCLE_STRIPS

@@ -12,13 +12,16 @@ def numbers(values: Iterable[float]) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def child(parent: Element, tag: str, text: str | float | None = None, **attributes: str | float | Iterable[float]) -> Element:
+Value = str | float | Iterable[float]
+"""What an attribute can hold."""
+
+
+def child(parent: Element, tag: str, text: str | float | None = None, /, **attributes: Value) -> Element:
     """Add a child with attributes, and text or a number inside; return it.
 
-    Attributes may be words, numbers or rows of numbers. An underscore at the end of a name (for names that Python keeps
-    for itself) is left out.
+    Attributes may be words, numbers or rows of numbers.
     """
-    element = SubElement(parent, tag, {key.rstrip("_"): _text(value) for key, value in attributes.items()})
+    element = SubElement(parent, tag, {key: _text(value) for key, value in attributes.items()})
     if text is not None:
         element.text = _text(text)
     return element
@@ -30,7 +33,7 @@ def document(root: Element) -> str:
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 
 
-def _text(value: str | float | Iterable[float]) -> str:
+def _text(value: Value) -> str:
     if isinstance(value, str):
         return value
     if isinstance(value, int | float):

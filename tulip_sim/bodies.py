@@ -21,7 +21,6 @@ from tulip_description.urdf import build_urdf
 from tulip_sim.parameters import WorldParameters, materials_of
 from tulip_sim.physics import pybullet
 
-
 QUIET = {
     "restitution": 0.0,
     "linearDamping": 0.0,

@@ -100,9 +100,7 @@ class MujocoRobot:
         ball_geom: The ball's number in the engine.
     """
 
-    def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, robot: Robot, prefix: str, ball_geom: int
-    ) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, robot: Robot, prefix: str, ball_geom: int) -> None:
         self._model, self._data, self._robot, self._ball_geom = model, data, robot, ball_geom
         self._carpet = model.geom(CARPET).id
         root = model.joint(f"{prefix}root")

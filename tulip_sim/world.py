@@ -1,4 +1,4 @@
-"""The simulated world: a physics engine at 1 kHz, one robot or several and a ball on the field, and the truth about them."""
+"""The simulated world: physics at 1 kHz, one robot or several and a ball on the field, and the truth about them."""
 
 from __future__ import annotations
 

@@ -73,7 +73,20 @@ def build_mjcf(world: MjcfWorld) -> str:
         check_realizable(placement.robot, "MJCF")
         add_robot(bodies, placement, number, len(world.robots), world.materials, world.camera)
         add_robot_devices(actuator, sensor, custom, placement)
-    for section in (bodies, contact, actuator, sensor, custom):
+    keyframe = Element("keyframe")
+    if any(placement.stand for placement in world.robots):
+        child(keyframe, "key", name="stand", qpos=_standing(world))
+    for section in (bodies, contact, actuator, sensor, custom, keyframe):
         if len(section):
             root.append(section)
     return document(root)
+
+
+def _standing(world: MjcfWorld) -> list[float]:
+    """Return qpos of robots that stand where they are put, in the order of the bodies."""
+    qpos = [0.0, 0.0, world.field.ball_radius, 1.0, 0.0, 0.0, 0.0] if BALL in world.parts else []
+    for placement in world.robots:
+        joints = placement.stand.joint_positions.tolist() if placement.stand else [0.0] * len(placement.robot.moving)
+        height = placement.stand.base_height if placement.stand else placement.height
+        qpos += [0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0, *joints]
+    return qpos

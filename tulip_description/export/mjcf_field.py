@@ -11,7 +11,7 @@ from tulip_description.field_solids import goal_frame, net_walls, painted_strips
 from tulip_description.keeper import keeper_parts
 from tulip_description.materials import BALL_FRICTION, NET_FRICTION, POST_FRICTION, Materials
 from tulip_description.paint import COLOURS
-from tulip_description.xml_text import child
+from tulip_description.xml_text import Value, child
 
 CARPET, BALL_NAME = "carpet", "ball"
 PRIORITY = {"net": 3, "ball": 2, "carpet": 1}
@@ -21,8 +21,15 @@ that MuJoCo takes at 1 ms. Under the standing robot the soles are some micrometr
 HARD_SOLIMP = (0.98, 0.98, 0.001)
 SPRING_SOLIMP = (0.95, 0.95, 0.001)
 TORSION, ROLLING = 0.005, 0.0001  # [m] MuJoCo's own; contacts of three dimensions do not use them
-TWO_SIDED = {"contype": SCENERY, "conaffinity": SCENERY}
-SEEN_ONLY = {"contype": 0, "conaffinity": 0, "group": 1}
+TWO_SIDED: dict[str, Value] = {"contype": SCENERY, "conaffinity": SCENERY}
+SEEN_ONLY: dict[str, Value] = {"contype": 0, "conaffinity": 0, "group": 1}
+HARD: dict[str, Value] = {
+    "friction": (POST_FRICTION, TORSION, ROLLING),
+    "solref": HARD_SOLREF,
+    "solimp": HARD_SOLIMP,
+    **TWO_SIDED,
+}
+"""Posts, poles and figures."""
 PAINT_HEIGHT = 0.0005  # [m] of lines above the carpet, for pictures
 
 
@@ -73,7 +80,6 @@ def add_carpet(bodies: Element, field: Field, materials: Materials) -> None:
 
 def add_solids(bodies: Element, field: Field, materials: Materials, poles: bool) -> None:
     """Add goals with their nets, and poles."""
-    hard = {"friction": (POST_FRICTION, TORSION, ROLLING), "solref": HARD_SOLREF, "solimp": HARD_SOLIMP, **TWO_SIDED}
     goals = (field.own_goal, field.opponent_goal)
     for pipe in (*goal_frame(goals[0]), *goal_frame(goals[1]), *(pole_segments(field) if poles else ())):
         child(
@@ -85,7 +91,7 @@ def add_solids(bodies: Element, field: Field, materials: Materials, poles: bool)
             euler=(0.0 if pipe.upright else math.pi / 2, 0.0, 0.0),
             size=(pipe.radius, pipe.length / 2),
             rgba=(*COLOURS[pipe.colour], 1.0),
-            **hard,
+            **HARD,
         )
     soft = spring(materials.net_stiffness, materials.net_damping, materials.ball_mass)
     for goal in goals:
@@ -148,7 +154,6 @@ def figure_name(number: int) -> str:
 def add_figure(bodies: Element, number: int) -> None:
     """Add a figure like the keeper's, which nothing pushes away."""
     body = child(bodies, "body", name=figure_name(number), mocap="true")
-    hard = {"friction": (POST_FRICTION, TORSION, ROLLING), "solref": HARD_SOLREF, "solimp": HARD_SOLIMP, **TWO_SIDED}
     for part in keeper_parts():
         child(
             body,
@@ -159,5 +164,5 @@ def add_figure(bodies: Element, number: int) -> None:
             size=tuple(size / 2 for size in part.size),
             rgba=(*COLOURS[part.colour], 1.0),
             mass=0.0,
-            **(hard if part.solid else SEEN_ONLY),
+            **(HARD if part.solid else SEEN_ONLY),
         )

@@ -10,8 +10,9 @@ from tulip_description import frames
 from tulip_description.export.camera_view import CameraView
 from tulip_description.materials import SOLE_FRICTION, Materials
 from tulip_description.paint import COLOURS
+from tulip_description.posture import Posture
 from tulip_description.robot import CELL_NAMES, SIDES, Box, Foot, Link, Robot, Vector
-from tulip_description.xml_text import child
+from tulip_description.xml_text import Value, child
 
 SCENERY = 1  # collision bit of everything that is no robot; robot i has bit i + 1
 SITE_THICKNESS = 0.02  # [m] of a force cell's site, half of it below the sole: contacts lie a little inside or outside
@@ -26,6 +27,7 @@ class Placement:
         prefix: Put before all its names.
         marker: Colour of its team marker.
         height: Of base_link above the ground at the start [m].
+        stand: Its standing posture, as key frame; None for none.
         joint_friction: Whether MuJoCo computes the joints' dry friction; not where the simulator does it.
     """
 
@@ -33,6 +35,7 @@ class Placement:
     prefix: str = ""
     marker: str = "cyan"
     height: float = 0.0
+    stand: Posture | None = None
     joint_friction: bool = True
 
 
@@ -42,7 +45,12 @@ def add_robot(
     """Add a floating robot, the `number`-th of `count`."""
     own = SCENERY << (number + 1)
     others = sum(SCENERY << (other + 1) for other in range(count) if other != number)
-    shape = {"contype": own, "conaffinity": SCENERY | others, "friction": (SOLE_FRICTION, 0.005, 0.0001), "group": 0}
+    shape: dict[str, Value] = {
+        "contype": own,
+        "conaffinity": SCENERY | others,
+        "friction": (SOLE_FRICTION, 0.005, 0.0001),
+        "group": 0,
+    }
     _add_body(bodies, placement, placement.robot.links[0], (0.0, 0.0, placement.height), shape, materials, camera)
 
 
@@ -51,7 +59,7 @@ def _add_body(
     placement: Placement,
     link: Link,
     origin: Vector,
-    shape: dict[str, object],
+    shape: dict[str, Value],
     materials: Materials,
     camera: CameraView | None,
 ) -> None:
@@ -81,11 +89,11 @@ def _add_body(
             _add_body(body, placement, robot.link(other.child), other.origin, shape, materials, camera)
 
 
-def _add_box(body: Element, name: str, box: Box, marker: str, shape: dict[str, object]) -> None:
+def _add_box(body: Element, name: str, box: Box, marker: str, shape: dict[str, Value]) -> None:
     colour = marker if box.colour == "marker" else box.colour
-    contacts = shape if box.collides else {"contype": 0, "conaffinity": 0, "group": 1}
+    contacts: dict[str, Value] = shape if box.collides else {"contype": 0, "conaffinity": 0, "group": 1}
     half = tuple(size / 2 for size in box.size)
-    child(body, "geom", name=name, type="box", pos=box.centre, size=half, rgba=(*COLOURS[colour], 1.0), **contacts)  # type: ignore[arg-type]
+    child(body, "geom", name=name, type="box", pos=box.centre, size=half, rgba=(*COLOURS[colour], 1.0), **contacts)
 
 
 def _add_mounts(body: Element, placement: Placement, link: Link, camera: CameraView | None) -> None:
@@ -119,12 +127,12 @@ def _add_mounts(body: Element, placement: Placement, link: Link, camera: CameraV
 def cell_areas(foot: Foot) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     """Return middle and size [m] of the quarter of the sole that each force cell carries, in the sole frame."""
     (x0, x1), (y0, y1) = foot.x, foot.y
-    size = ((x1 - x0) / 2, (y1 - y0) / 2)
-    middle = ((x0 + x1) / 2, (y0 + y1) / 2)
+    length, width = (x1 - x0) / 2, (y1 - y0) / 2
+    x, y = (x0 + x1) / 2, (y0 + y1) / 2
     return [
-        (tuple(m + math.copysign(s / 2, c - m) for m, s, c in zip(middle, size, cell, strict=True)), size)
+        ((x + math.copysign(length / 2, cell[0] - x), y + math.copysign(width / 2, cell[1] - y)), (length, width))
         for cell in foot.cells
-    ]  # type: ignore[misc]
+    ]
 
 
 def add_robot_devices(actuator: Element, sensor: Element, custom: Element, placement: Placement) -> None:

@@ -65,10 +65,14 @@ class BulletEngine:
         # pybullet wants place and velocity of the trunk's CoM.
         linear = rotation @ (state.v[:3] + np.cross(state.v[3:6], self._com))
         angular = rotation @ state.v[3:6]
-        pybullet.resetBasePositionAndOrientation(self._body.number, com.tolist(), state.q[3:7].tolist(), physicsClientId=client)
+        pybullet.resetBasePositionAndOrientation(
+            self._body.number, com.tolist(), state.q[3:7].tolist(), physicsClientId=client
+        )
         pybullet.resetBaseVelocity(self._body.number, linear.tolist(), angular.tolist(), physicsClientId=client)
         for name, angle, speed in zip(self.robot.joint_names, state.q[7:], state.v[6:], strict=True):
-            pybullet.resetJointState(self._body.number, self._body.index[name], float(angle), float(speed), physicsClientId=client)
+            pybullet.resetJointState(
+                self._body.number, self._body.index[name], float(angle), float(speed), physicsClientId=client
+            )
         own.read_joints()
 
     def apply(self, command: JointCommand) -> str:
