@@ -18,7 +18,7 @@ from tulip_description.materials import BALL_FRICTION, GRAVITY, NET_FRICTION, PO
 from tulip_description.planar import Pose2D
 from tulip_description.robot import Box, Robot, realizable_inertia
 from tulip_description.urdf import build_urdf
-from tulip_sim.parameters import WorldParameters, materials_of
+from tulip_sim.parameters import STEP, WorldParameters, materials_of
 from tulip_sim.physics import pybullet
 
 QUIET = {
@@ -36,7 +36,7 @@ def connect(parameters: WorldParameters) -> int:
     pybullet.resetSimulation(physicsClientId=client)
     pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
     pybullet.setPhysicsEngineParameter(
-        fixedTimeStep=0.001,
+        fixedTimeStep=STEP,
         numSubSteps=0,
         numSolverIterations=parameters.solver_iterations,
         deterministicOverlappingPairs=1,

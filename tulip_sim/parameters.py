@@ -9,6 +9,7 @@ from tulip_description.materials import Materials
 
 ENGINES = ("pybullet", "mujoco")
 """Physics engines that can stand behind a world."""
+STEP = 0.001  # [s] of physics
 
 
 @dataclass(frozen=True)
@@ -164,6 +165,9 @@ class WorldParameters:
 def materials_of(parameters: WorldParameters, friction: float | None = None) -> Materials:
     """Return what a world is made of.
 
+    pybullet's spring of a contact is implicit: its force is that of the depth after the step, K (d + h d') + B d', so it
+    damps with B + h K. That is how its ball bounces, and what other engines have to be given.
+
     Args:
         parameters: Of the world.
         friction: Of its carpet, as drawn; None for the middle of the range. Joint friction is the middle of its range.
@@ -174,8 +178,8 @@ def materials_of(parameters: WorldParameters, friction: float | None = None) -> 
         ball_mass=p.ball_mass,
         ball_rolling_deceleration=p.ball_rolling_deceleration,
         ball_stiffness=p.ball_stiffness,
-        ball_damping=p.ball_damping,
+        ball_damping=p.ball_damping + STEP * p.ball_stiffness,
         net_stiffness=p.net_stiffness,
-        net_damping=p.net_damping,
+        net_damping=p.net_damping + STEP * p.net_stiffness,
         joint_friction=sum(p.joint_friction) / 2,
     )

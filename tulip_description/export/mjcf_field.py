@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from xml.etree.ElementTree import Element
 
-from tulip_description.export.mjcf_robot import SCENERY
+from tulip_description.export.mjcf_robot import HARD_SOLIMP, HARD_SOLREF, SCENERY
 from tulip_description.field import Field
 from tulip_description.field_solids import goal_frame, net_walls, painted_strips, pole_segments
 from tulip_description.keeper import keeper_parts
@@ -15,10 +15,6 @@ from tulip_description.xml_text import Value, child
 
 CARPET, BALL_NAME = "carpet", "ball"
 PRIORITY = {"net": 3, "ball": 2, "carpet": 1}
-HARD_SOLREF = (0.004, 1.0)
-"""Time constant [s] and damping ratio with which hard bodies are pushed apart: critically damped, twice the shortest
-that MuJoCo takes at 1 ms. Under the standing robot the soles are some micrometres deep."""
-HARD_SOLIMP = (0.98, 0.98, 0.001)
 SPRING_SOLIMP = (0.95, 0.95, 0.001)
 TORSION, ROLLING = 0.005, 0.0001  # [m] MuJoCo's own; contacts of three dimensions do not use them
 TWO_SIDED: dict[str, Value] = {"contype": SCENERY, "conaffinity": SCENERY}

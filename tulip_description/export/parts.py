@@ -31,8 +31,8 @@ def check_realizable(robot: Robot, form: str) -> None:
     bad = [link.name for link in robot.links if why_impossible(link.mass, link.com, link.inertia)]
     if bad:
         raise ExportError(
-            f"inertias of {', '.join(bad)} (variant {robot.variant}) belong to no body, and no program that reads {form}"
-            " takes them; expected the playing variant, or urdf alone"
+            f"inertias of {', '.join(bad)} (variant {robot.variant}) belong to no body, and no program that reads"
+            f" {form} takes them; expected the playing variant, or urdf alone"
         )
 
 

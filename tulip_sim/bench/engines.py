@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from tulip_description.planar import Pose2D
-from tulip_motion.interface import WalkCommand, WalkMode
+from tulip_motion.interface import KickKind, Side, WalkCommand, WalkMode
 from tulip_motion.reach import Velocity
+from tulip_sim.bench import kick
 from tulip_sim.bench.body import Body
 from tulip_sim.bench.runner import Bench, Row
 from tulip_sim.bench.tracking import Tracking
@@ -20,6 +21,7 @@ START = Pose2D(-30.0, 10.0, 0.0)  # far from goals and ball
 SEEDS = 10
 FALLING = 250  # ticks before a fall is detected whose errors say nothing of the control
 RANDOM = "random commands"
+KICK = "kick forward"
 
 # velocity, duration [s]; None is to stand
 TASKS: dict[str, tuple[Velocity | None, float]] = {
@@ -40,7 +42,9 @@ def commands(task: str, seed: int) -> Iterator[WalkCommand]:
 
 
 def measure(task: str, engine: str, seed: int) -> Row:
-    """Stand or walk once."""
+    """Stand, walk or kick once."""
+    if task == KICK:
+        return _kick(engine, seed)
     body = Body(seed, START, world=WorldParameters(engine=engine))
     body.go(0.3)
     tracking, begin = Tracking(), body.world.truth().base_position
@@ -68,6 +72,12 @@ def measure(task: str, engine: str, seed: int) -> Row:
     }
 
 
+def _kick(engine: str, seed: int) -> Row:
+    kicked = kick.measure(KickKind.FORWARD, Side(seed % 2), seed, 0.0, True, WorldParameters(engine=engine))
+    names = ("upright", "ball speed [m/s]", "direction error [deg]", "greatest torque by limit", "greatest tilt [rad]")
+    return {"task": KICK, "engine": engine, "seed": seed} | {name: kicked[name] for name in names}
+
+
 def summarize(rows: list[Row]) -> list[str]:
     """Return a table, one line a task and engine."""
     seeds = len({row["seed"] for row in rows})
@@ -77,7 +87,7 @@ def summarize(rows: list[Row]) -> list[str]:
         " the estimated CoM against the planned one, of the measured centre of pressure against the commanded ZMP."
         " What differs between the engines is the physics of contacts and of a step: [engines.md](engines.md).",
         "",
-        "| task | engine | upright | joints | CoM | ZMP | tilt, most | torque by its limit, most | way: least, median |",
+        "| task | engine | upright | joints | CoM | ZMP | tilt, most | torque by limit, most | way: least, median |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for task, (_, duration) in TASKS.items():
@@ -97,13 +107,31 @@ def summarize(rows: list[Row]) -> list[str]:
                 f" | {max(row['greatest torque by limit'] for row in own):.2f}"
                 f" | {min(ways):.2f} m, {np.median(ways):.2f} m |"
             )
+    wanted = kick.WANTED[KickKind.FORWARD]
+    lines += [
+        "",
+        f"The same for the forward kick from standing, {wanted} m/s wanted.",
+        "",
+        "| engine | upright | ball speed: least, median, most | direction error: median, most |",
+        "| --- | --- | --- | --- |",
+    ]
+    for engine in ENGINES:
+        own = [row for row in rows if (row["task"], row["engine"]) == (KICK, engine)]
+        if own:
+            speeds = [row["ball speed [m/s]"] for row in own]
+            errors = [abs(row["direction error [deg]"]) for row in own]
+            lines.append(
+                f"| {engine} | {sum(row['upright'] for row in own)} of {len(own)}"
+                f" | {min(speeds):.2f}, {np.median(speeds):.2f}, {max(speeds):.2f} m/s"
+                f" | {np.median(errors):.1f}, {max(errors):.1f} deg |"
+            )
     return lines
 
 
 BENCH = Bench(
     "engines",
     "Physics engines",
-    [(task, engine, seed) for task in TASKS for seed in range(SEEDS) for engine in ENGINES],
+    [(task, engine, seed) for task in (*TASKS, KICK) for seed in range(SEEDS) for engine in ENGINES],
     measure,
     summarize,
 )

@@ -8,7 +8,7 @@ from tulip_motion.interface import MotionState
 
 
 class Tracking:
-    """Collects, tick by tick, errors of the joints against q_d, of the CoM against its plan, of the CoP against the ZMP.
+    """Errors, tick by tick, of the joints against q_d, of the CoM against its plan, of the CoP against the ZMP.
 
     The CoM is the estimated one, the CoP the measured one, the ZMP the commanded one.
     """
@@ -26,7 +26,7 @@ class Tracking:
         self._squares.append((float((joints**2).mean()), float((com**2).sum()), float((zmp**2).sum())))
 
     def rms(self, ticks: int | None = None) -> tuple[float, float, float]:
-        """Return RMS errors of the joints [mrad], the CoM [mm] and the ZMP [mm] over the first ticks, by default all."""
+        """Return RMS errors of joints [mrad], CoM [mm] and ZMP [mm] over the first ticks, by default all."""
         # Without contact, in the air, there is no ZMP.
         joint, com, zmp = (1000.0 * value for value in np.sqrt(np.nanmean(self._squares[:ticks], axis=0)).tolist())
         return joint, com, zmp

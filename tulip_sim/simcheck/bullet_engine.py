@@ -15,7 +15,7 @@ from tulip_description.robot_io import JointCommand
 from tulip_sim import bodies
 from tulip_sim.bullet_physics import BulletRobot
 from tulip_sim.driver import MILLISECOND
-from tulip_sim.parameters import WorldParameters
+from tulip_sim.parameters import STEP, WorldParameters
 from tulip_sim.physics import pybullet
 from tulip_sim.simcheck.engine import Millisecond, State
 from tulip_sim.simulated_robot import SimulatedRobot
@@ -38,7 +38,7 @@ class BulletEngine:
         self.robot, self._substeps, self._now = robot, substeps, 0
         self._client = bodies.connect(parameters)
         self._finalizer = weakref.finalize(self, pybullet.disconnect, self._client)
-        pybullet.setPhysicsEngineParameter(fixedTimeStep=1e-3 / substeps, physicsClientId=self._client)
+        pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP / substeps, physicsClientId=self._client)
         self._carpet = bodies.add_carpet(self._client, parameters.friction[0])
         unused = np.random.default_rng(0)
         self._body = BulletRobot(self._client, robot, self._carpet)
