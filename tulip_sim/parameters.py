@@ -165,8 +165,8 @@ class WorldParameters:
 def materials_of(parameters: WorldParameters, friction: float | None = None) -> Materials:
     """Return what a world is made of.
 
-    pybullet's spring of a contact is implicit: its force is that of the depth after the step, K (d + h d') + B d', so it
-    damps with B + h K. That is how its ball bounces, and what other engines have to be given.
+    pybullet's spring of a contact is implicit: its force is that of the depth after the step, K (d + h d') + B d', so
+    it damps with B + h K. That is how its ball bounces, and what other engines have to be given.
 
     Args:
         parameters: Of the world.

@@ -22,6 +22,7 @@ HARD_SOLIMP = (0.98, 0.98, 0.001)
 LIMIT_SOLIMP = (0.99, 0.99, 0.001)
 """Of a joint at the end of its range. What the force lacks to stop is made up by depth: an ankle roll, 0.0005 kg m^2,
 that is pushed by 12 N m goes 4 mrad too far; MuJoCo's own softness would let it go 0.5 rad."""
+SITE_MARGIN = 0.01  # [m] of force cells beyond the sole's edge
 SITE_THICKNESS = 0.02  # [m] of a force cell's site, half of it below the sole: contacts lie a little inside or outside
 
 
@@ -134,9 +135,12 @@ def _add_mounts(body: Element, placement: Placement, link: Link, camera: CameraV
 
 
 def cell_areas(foot: Foot) -> list[tuple[tuple[float, float], tuple[float, float]]]:
-    """Return middle and size [m] of the quarter of the sole that each force cell carries, in the sole frame."""
+    """Return middle and size [m] of what each force cell feels, in the sole frame.
+
+    That is its quarter of the sole, and a margin beyond the edge: contacts lie on corners, which rounding puts outside.
+    """
     (x0, x1), (y0, y1) = foot.x, foot.y
-    length, width = (x1 - x0) / 2, (y1 - y0) / 2
+    length, width = (x1 - x0) / 2 + SITE_MARGIN, (y1 - y0) / 2 + SITE_MARGIN
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
     return [
         ((x + math.copysign(length / 2, cell[0] - x), y + math.copysign(width / 2, cell[1] - y)), (length, width))
