@@ -80,7 +80,7 @@ def test_merging_fixed_links_gives_pinocchios_bodies() -> None:
 def test_a_missing_body_is_named() -> None:
     wanted = robot_figures(ROBOT, MATERIALS)
     found = replace(wanted, bodies={name: body for name, body in wanted.bodies.items() if name != "neck"})
-    with pytest.raises(MissingPartError, match="expected base_link.*neck"):
+    with pytest.raises(MissingPartError, match=r"expected base_link.*neck"):
         compare(found, wanted)
 
 
