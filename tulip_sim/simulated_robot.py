@@ -185,7 +185,9 @@ class SimulatedRobot:
         return np.array([cell_forces(foot, self.body.sole_contacts(side)) for side, foot in enumerate(self.robot.feet)])
 
 
-def as_drawn(robot: Robot, parameters: WorldParameters, rng: np.random.Generator, true_body: Robot | None) -> Robot:
+def as_drawn(
+    robot: Robot, parameters: WorldParameters, rng: np.random.Generator, true_body: Robot | None = None
+) -> Robot:
     """Return what a robot really is like: each link's mass and inertia off by a random share.
 
     Args:

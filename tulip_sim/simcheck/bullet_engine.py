@@ -18,7 +18,7 @@ from tulip_sim.driver import MILLISECOND
 from tulip_sim.parameters import STEP, WorldParameters
 from tulip_sim.physics import pybullet
 from tulip_sim.simcheck.engine import Millisecond, State
-from tulip_sim.simulated_robot import SimulatedRobot
+from tulip_sim.simulated_robot import SimulatedRobot, as_drawn
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,8 @@ class BulletEngine:
         pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP / substeps, physicsClientId=self._client)
         self._carpet = bodies.add_carpet(self._client, parameters.friction[0])
         unused = np.random.default_rng(0)
-        self._body = BulletRobot(self._client, robot, self._carpet)
+        really = as_drawn(robot, parameters, unused)
+        self._body = BulletRobot(self._client, really, self._carpet)
         self._simulated = SimulatedRobot(robot, self._body, parameters, start, Pose2D(), (unused, unused))
         self._com = np.array(robot.links[0].com)
         self._push, self._push_end = np.zeros(3), 0
