@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 class SimulatedRobot:
-    """A body in a physics engine, with what is its own: driver, sensor errors, masses and joint friction.
+    """A body in a physics engine, with what is its own: driver, sensor errors and joint friction.
 
     Attributes:
         robot: What it is like, as motion control knows it.

@@ -61,14 +61,13 @@ class World:
         self.field = field if field is not None else load_field()
         self.robot = robot if robot is not None else load_robot()
         seeds = np.random.default_rng(seed)
-        physics_rng, sensor_rng = seeds.spawn(2)
+        poses = (scenario.robot, *scenario.others)
+        rngs = [(physics_rng, sensor_rng) for physics_rng, sensor_rng in (seeds.spawn(2) for _ in poses)]
         start = standing_posture(self.robot).joint_positions if joint_positions is None else np.array(joint_positions)
         p = self.parameters
         self._now = 0
-        self.friction = float(physics_rng.uniform(*p.friction))
+        self.friction = float(rngs[0][0].uniform(*p.friction))
         """Of the carpet, as drawn."""
-        poses, rngs = (scenario.robot, *scenario.others), [(physics_rng, sensor_rng)]
-        rngs += [(first, second) for first, second in (seeds.spawn(2) for _ in scenario.others)]
         figures = (() if scenario.keeper is None else (scenario.keeper.pose,)) + scenario.obstacles
         really = tuple(as_drawn(self.robot, p, rng, true_body) for rng, _ in rngs)
         self.physics = make_physics(Layout(self.field, p, self.friction, scenario.poles, figures, really))

@@ -17,7 +17,7 @@ from tulip_description.xml_text import Value, child
 SCENERY = 1  # collision bit of everything that is no robot; robot i has bit i + 1
 HARD_SOLREF = (0.004, 1.0)
 """Time constant [s] and damping ratio with which hard bodies are pushed apart: critically damped, twice the shortest
-that MuJoCo takes at 1 ms. Under the standing robot the soles are some micrometres deep."""
+that MuJoCo takes at 1 ms. Under the standing robot the soles are 10 micrometres deep."""
 HARD_SOLIMP = (0.98, 0.98, 0.001)
 LIMIT_SOLIMP = (0.99, 0.99, 0.001)
 """Of a joint at the end of its range. What the force lacks to stop is made up by depth: an ankle roll, 0.0005 kg m^2,
