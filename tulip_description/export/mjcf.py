@@ -17,9 +17,10 @@ from tulip_description.export.mjcf_robot import Placement, add_robot, add_robot_
 from tulip_description.export.parts import BALL, FIELD, PARTS, check_parts, check_realizable
 from tulip_description.field import Field
 from tulip_description.materials import GRAVITY, Materials
-from tulip_description.xml_text import child, document
+from tulip_description.xml_text import Value, child, document
 
 STEP = 0.001  # [s] that of the joint driver
+SKY: dict[str, Value] = {"rgb1": (0.75, 0.8, 0.85), "rgb2": (0.45, 0.55, 0.65)}
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,10 @@ def build_mjcf(world: MjcfWorld) -> str:
     child(
         root, "option", timestep=STEP, gravity=(0.0, 0.0, -GRAVITY), integrator="Euler", cone="elliptic", impratio=10.0
     )
-    child(child(root, "visual"), "global", offwidth=1280, offheight=960)
+    visual = child(root, "visual")
+    child(visual, "global", offwidth=1280, offheight=960)
+    child(visual, "quality", shadowsize=4096)
+    child(child(root, "asset"), "texture", name="sky", type="skybox", builtin="gradient", width=256, height=256, **SKY)
     bodies = Element("worldbody")
     child(bodies, "light", pos=(0.0, 0.0, 6.0), dir=(0.0, 0.0, -1.0), directional="true", diffuse=(0.6, 0.6, 0.6))
     contact, actuator, sensor, custom = (Element(tag) for tag in ("contact", "actuator", "sensor", "custom"))

@@ -26,7 +26,7 @@ HARD: dict[str, Value] = {
     **TWO_SIDED,
 }
 """Posts, poles and figures."""
-PAINT_HEIGHT = 0.0005  # [m] of lines above the carpet, for pictures
+PAINT_HEIGHT = 0.002  # [m] of lines above the carpet; less, and pictures show them torn
 
 
 def spring(stiffness: float, damping: float, mass: float) -> tuple[float, float]:
