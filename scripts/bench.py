@@ -7,7 +7,8 @@ import sys
 import _environment
 
 if __name__ == "__main__":
-    _environment.prepare(("bench",) if {"clik", "log", "vision"} & set(sys.argv) else ())  # what these compare with
+    compared = ("bench",) if {"clik", "log", "vision"} & set(sys.argv) else ()  # what these compare with
+    _environment.prepare((*compared, "mujoco") if "engines" in sys.argv else compared)
 
 import json
 from pathlib import Path
@@ -26,6 +27,7 @@ from tulip_sim.bench import (
     clik,
     control,
     dynamics,
+    engines,
     head,
     identify,
     ilc,
@@ -46,7 +48,7 @@ from tulip_sim.bench import (
 from tulip_sim.bench.runner import Row, run, save, write_results
 
 MODULES = (
-    *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress),
+    *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress, engines),
     *(simcheck, vision, localization, ball, head, latency, log, identify, dynamics),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}

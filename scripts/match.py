@@ -7,7 +7,8 @@ import _environment
 if __name__ == "__main__":
     import sys
 
-    _environment.prepare(("view",) if "--view" in sys.argv else ())
+    EXTRAS = {"--view": "view", "mujoco": "mujoco", "--engine=mujoco": "mujoco"}  # that a word of the command needs
+    _environment.prepare(tuple(extra for word, extra in EXTRAS.items() if word in sys.argv))
 
 import json
 import os
@@ -22,7 +23,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, unknown
+from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, require, unknown
 from tulip_ros.picture_rate import PICTURE_RATE, PictureRate
 from tulip_ros.plan import Start
 from tulip_ros.recorder_node import PICTURES
@@ -34,6 +35,7 @@ from tulip_sim.match_rules import NAMESPACES, MatchRules
 from tulip_sim.match_settings import MatchSettings
 from tulip_sim.match_summary import MatchSummary
 from tulip_sim.match_two_graph import match_plan, play_match_graph
+from tulip_sim.parameters import ENGINES, WorldParameters
 from tulip_sim.perception import PerceptionParameters
 from tulip_sim.play_lockstep_match import play_lockstep_match
 from tulip_sim.robot_stack import RobotSettings
@@ -65,6 +67,7 @@ def main(
         str,
         typer.Option(help="camera (pictures and vision), or features made up from the truth: degraded or ideal"),
     ] = "camera",
+    engine: Annotated[str, typer.Option(help=f"Physics: {' or '.join(ENGINES)}.")] = WorldParameters.engine,
     pictures: Annotated[
         str,
         typer.Option(
@@ -100,16 +103,22 @@ def main(
                 raise BadInputError(f"{option} is {name!r}; expected one of {', '.join(STRATEGIES)}.")
         if eyes not in EYES:
             raise BadInputError(f"--eyes is {eyes!r}; expected one of {', '.join(EYES)}.")
+        if engine not in ENGINES:
+            raise BadInputError(f"--engine is {engine!r}; expected {' or '.join(ENGINES)}.")
+        if engine == "mujoco":
+            require("mujoco", "mujoco")
         if mode != "graph" and (parameters or logs or view):
             raise BadInputError("--parameters, --logs and --view are for nodes; expected --mode graph with them.")
         kinds = tuple(PICTURES) if mode == "graph" else KINDS
         if pictures not in kinds:
             raise BadInputError(f"--pictures is {pictures!r}; expected one of {', '.join(kinds)} in mode {mode}.")
         PictureRate(picture_rate)
-        own = {"recorder": {"pictures": pictures, "picture_rate": picture_rate}}
+        own: dict[str, dict[str, Any]] = {"recorder": {"pictures": pictures, "picture_rate": picture_rate}}
+        if engine != WorldParameters.engine:
+            own["driver"] = {"world.engine": engine}
         recorded = RecordedPictures(pictures, picture_rate)
         if teams == 2:
-            match = match_settings(trials, playing_time, striker, keeper, EYES[eyes])
+            match = match_settings(trials, playing_time, striker, keeper, EYES[eyes], engine)
             if mode == "graph" and EYES[eyes] is not None:
                 raise BadInputError("--eyes is for one robot, or for --mode lockstep; expected camera with two.")
         if json_path is not None:
@@ -156,7 +165,7 @@ def main(
                 )
             else:
                 beside = (os.cpu_count() or 1) > 1 and EYES[eyes] is None
-                settings = Settings(perception=EYES[eyes])
+                settings = Settings(perception=EYES[eyes], world=WorldParameters(engine=engine))
                 summary = play_lockstep(seed, scenario, settings, folder, show, beside, striker, recorded)
     except (BadInputError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
@@ -178,7 +187,7 @@ def default_folder(seed: int, mode: str) -> Path:
 
 
 def match_settings(
-    trials: int, playing_time: float, striker: str, keeper: str, perception: PerceptionParameters | None
+    trials: int, playing_time: float, striker: str, keeper: str, perception: PerceptionParameters | None, engine: str
 ) -> MatchSettings:
     """Return the settings of a match.
 
@@ -190,7 +199,8 @@ def match_settings(
     except ValueError as error:
         raise BadInputError(f"{error}.") from error
     robot = RobotSettings(perception=perception)
-    return MatchSettings(rules=rules, robots=(robot, robot), striker=striker, keeper=keeper)
+    world = WorldParameters(engine=engine)
+    return MatchSettings(world=world, rules=rules, robots=(robot, robot), striker=striker, keeper=keeper)
 
 
 def play_match(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import date
@@ -190,7 +191,7 @@ def _source(entry: Mapping[str, Any]) -> BodySource:
 
 def _get(entry: Any, key: str, where: str) -> Any:
     if not isinstance(entry, Mapping):
-        raise _WrongError(f"{where} is {entry!r}; expected a mapping")
+        raise _WrongError(f"{where} is {reprlib.repr(entry)}; expected a mapping")
     if key not in entry:
         raise _WrongError(f"{where}: {key} is missing")
     return entry[key]

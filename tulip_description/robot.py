@@ -24,6 +24,8 @@ LEG_PARTS = ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle_pitch", "ankle_r
 LEG_JOINTS = tuple(f"{side}_{part}" for side in SIDES for part in LEG_PARTS)
 """The twelve leg joints, left leg first, from the trunk down."""
 HEAD_JOINTS = ("head_pan", "head_tilt")
+CELL_NAMES = ("heel_inner", "heel_outer", "toe_inner", "toe_outer")
+"""The force cells of a foot, in the order of all arrays of cells."""
 JOINTS = LEG_JOINTS + HEAD_JOINTS
 """All joints of the playing robot: the order of every array of 14. The `table` variant has only LEG_JOINTS."""
 

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from tulip_description.frames import BASE_LINK
 from tulip_description.robot import (
+    CELL_NAMES,
     JOINTS,
     LEG_JOINTS,
     LEG_PARTS,
@@ -27,7 +28,6 @@ from tulip_description.yaml_file import read_yaml
 
 AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 T = TypeVar("T")
-CELLS = ("heel_inner", "heel_outer", "toe_inner", "toe_outer")
 
 
 def read_robot(variant: str, path: Path) -> Robot:
@@ -161,7 +161,7 @@ class _Reader:
 
     def _foot(self, foot: Mapping[str, Any], side: float) -> Foot:
         entry = _get(foot, "cells", "foot", dict)
-        cells = [_pair(entry, name, "foot, cells") for name in CELLS]
+        cells = [_pair(entry, name, "foot, cells") for name in CELL_NAMES]
         y = sorted(side * value for value in _pair(foot, "y", "foot"))
         return Foot(_pair(foot, "x", "foot"), (y[0], y[1]), tuple((cell[0], side * cell[1]) for cell in cells))
 

@@ -24,7 +24,7 @@ PARAMETERS = "parameters/"
 """Begins the names of attached parameter files, as in parameters/striker/vision.yaml."""
 PACKAGES = (
     *("tulip-soccer", "ros-jazzy-rclpy", "ros-rmw-fastrtps-cpp", "mcap", "numpy", "scipy", "pin", "filterpy", "numba"),
-    *("opencv-python-headless", "pybullet", "py_trees"),
+    *("opencv-python-headless", "pybullet", "mujoco", "py_trees"),
 )
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """As safe as the other, and ten times as fast where its library is there."""

@@ -11,22 +11,15 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tulip_description.field import Field, Goal
+from tulip_description.field_solids import goal_frame, net_walls
 from tulip_description.keeper import KeeperPart, keeper_parts
+from tulip_description.materials import BALL_FRICTION, GRAVITY, NET_FRICTION, POST_FRICTION, SOLE_FRICTION
 from tulip_description.planar import Pose2D
 from tulip_description.robot import Box, Robot, realizable_inertia
 from tulip_description.urdf import build_urdf
-from tulip_sim.parameters import WorldParameters
+from tulip_sim.parameters import STEP, WorldParameters, materials_of
 from tulip_sim.physics import pybullet
-
-Array = NDArray[np.float64]
-GRAVITY = 9.81  # [m/s^2] as in the robot's models
-NET_THICKNESS = 0.10  # [m] thick enough that a ball of 10 m/s does not pass through it between two steps
-BALL_FRICTION = 0.7  # against the feet; against the carpet it is multiplied with the carpet's
-HOLLOW_SPHERE = 2.0 / 3.0  # inertia of a thin shell in m r^2
 
 QUIET = {
     "restitution": 0.0,
@@ -43,7 +36,7 @@ def connect(parameters: WorldParameters) -> int:
     pybullet.resetSimulation(physicsClientId=client)
     pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
     pybullet.setPhysicsEngineParameter(
-        fixedTimeStep=0.001,
+        fixedTimeStep=STEP,
         numSubSteps=0,
         numSolverIterations=parameters.solver_iterations,
         deterministicOverlappingPairs=1,
@@ -60,28 +53,17 @@ def add_carpet(client: int, friction: float) -> int:
 
 def add_goal(client: int, goal: Goal, parameters: WorldParameters) -> tuple[int, int]:
     """Add a goal; return the bodies of its frame (posts and bar) and of its net."""
-    radius, height = goal.posts[0].radius, goal.posts[0].height
-    bar_length = goal.width + 4.0 * radius
     quarter = math.sqrt(0.5)
+    pipes = goal_frame(goal)
     frame = pybullet.createCollisionShapeArray(
-        shapeTypes=[pybullet.GEOM_CYLINDER] * 3,
-        radii=[radius] * 3,
-        lengths=[height, height, bar_length],
-        collisionFramePositions=[[post.x, post.y, height / 2] for post in goal.posts]
-        + [[goal.x, 0.0, goal.height + radius]],
-        collisionFrameOrientations=[[0, 0, 0, 1], [0, 0, 0, 1], [quarter, 0, 0, quarter]],
+        shapeTypes=[pybullet.GEOM_CYLINDER] * len(pipes),
+        radii=[pipe.radius for pipe in pipes],
+        lengths=[pipe.length for pipe in pipes],
+        collisionFramePositions=[list(pipe.centre) for pipe in pipes],
+        collisionFrameOrientations=[[0, 0, 0, 1] if pipe.upright else [quarter, 0, 0, quarter] for pipe in pipes],
         physicsClientId=client,
     )
-    half = NET_THICKNESS / 2
-    middle, depth = (goal.x + goal.back) / 2, goal.depth
-    side = goal.posts[0].y + radius + half
-    walls = [
-        Box((NET_THICKNESS, bar_length, height), (goal.back + goal.outward * half, 0.0, height / 2), "", True),
-        Box((depth, NET_THICKNESS, height), (middle, side, height / 2), "", True),
-        Box((depth, NET_THICKNESS, height), (middle, -side, height / 2), "", True),
-        Box((depth, bar_length, NET_THICKNESS), (middle, 0.0, height + half), "", True),
-    ]
-    net = _static(client, _boxes(client, walls), friction=1.0)
+    net = _static(client, _boxes(client, net_walls(goal)), friction=NET_FRICTION)
     pybullet.changeDynamics(
         net,
         -1,
@@ -89,7 +71,7 @@ def add_goal(client: int, goal: Goal, parameters: WorldParameters) -> tuple[int,
         contactDamping=parameters.net_damping,
         physicsClientId=client,
     )
-    return _static(client, frame, friction=0.5), net
+    return _static(client, frame, friction=POST_FRICTION), net
 
 
 def add_poles(client: int, field: Field) -> tuple[int, ...]:
@@ -99,28 +81,26 @@ def add_poles(client: int, field: Field) -> tuple[int, ...]:
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_CYLINDER, radius=pole.radius, height=pole.height, physicsClientId=client
         )
-        bodies.append(_static(client, shape, friction=0.5, position=(pole.x, pole.y, pole.height / 2)))
+        bodies.append(_static(client, shape, friction=POST_FRICTION, position=(pole.x, pole.y, pole.height / 2)))
     return tuple(bodies)
 
 
 def add_ball(client: int, radius: float, carpet_friction: float, parameters: WorldParameters) -> int:
     """Add the ball, a thin shell, at the origin."""
-    mass = parameters.ball_mass
+    materials = materials_of(parameters, carpet_friction)
+    mass = materials.ball_mass
     shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=radius, physicsClientId=client)
     body = int(
         pybullet.createMultiBody(
             baseMass=mass, baseCollisionShapeIndex=shape, basePosition=[0.0, 0.0, radius], physicsClientId=client
         )
     )
-    inertia = HOLLOW_SPHERE * mass * radius**2
-    # A rolling resistance torque mu m g slows a rolling ball by mu g / (r (1 + I / m r^2)). pybullet multiplies mu
-    # with the other body's friction.
-    arm = parameters.ball_rolling_deceleration * radius * (1.0 + HOLLOW_SPHERE) / GRAVITY
+    arm = materials.rolling_arm(radius)  # pybullet multiplies it with the other body's friction
     pybullet.changeDynamics(
         body,
         -1,
         **{**QUIET, "rollingFriction": arm / carpet_friction, "spinningFriction": arm / carpet_friction},
-        localInertiaDiagonal=[inertia] * 3,
+        localInertiaDiagonal=[materials.ball_inertia(radius)] * 3,
         lateralFriction=BALL_FRICTION,
         contactStiffness=parameters.ball_stiffness,
         contactDamping=parameters.ball_damping,
@@ -132,7 +112,7 @@ def add_ball(client: int, radius: float, carpet_friction: float, parameters: Wor
 def add_figure(client: int, pose: Pose2D) -> int:
     """Add a figure like the keeper's. It has no mass, so nothing pushes it away; `move_figure` moves it."""
     shape = _boxes(client, [part for part in keeper_parts() if part.solid])
-    body = _static(client, shape, friction=0.5)
+    body = _static(client, shape, friction=POST_FRICTION)
     move_figure(client, body, pose)
     return body
 
@@ -143,13 +123,12 @@ def move_figure(client: int, body: int, pose: Pose2D) -> None:
     pybullet.resetBasePositionAndOrientation(body, [pose.x, pose.y, 0.0], turn, physicsClientId=client)
 
 
-def add_robot(client: int, robot: Robot, scale: Array) -> tuple[int, dict[str, int]]:
+def add_robot(client: int, robot: Robot) -> tuple[int, dict[str, int]]:
     """Load the robot, floating, all joints without motors.
 
     Args:
         client: Physics engine.
         robot: What to load.
-        scale: (links,) factors on each link's mass and inertia, order of `robot.links`.
 
     Returns:
         The body, and the pybullet index of each link and joint by name (base_link: -1; a joint: that of its child).
@@ -170,14 +149,14 @@ def add_robot(client: int, robot: Robot, scale: Array) -> tuple[int, dict[str, i
     for number in range(pybullet.getNumJoints(body, physicsClientId=client)):
         info = pybullet.getJointInfo(body, number, physicsClientId=client)
         index[info[1].decode()] = index[info[12].decode()] = number
-    for link, factor in zip(robot.links, scale, strict=True):
+    for link in robot.links:
         # Loading zeroes inertias that no body can have, as some of the table; changeDynamics takes them as they are.
         pybullet.changeDynamics(
             body,
             index[link.name],
-            mass=link.mass * float(factor),
-            localInertiaDiagonal=[moment * float(factor) for moment in link.inertia],
-            lateralFriction=1.0,
+            mass=link.mass,
+            localInertiaDiagonal=list(link.inertia),
+            lateralFriction=SOLE_FRICTION,
             jointDamping=0.0,
             **QUIET,
             physicsClientId=client,

@@ -5,6 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from tulip_description.materials import Materials
+
+ENGINES = ("pybullet", "mujoco")
+"""Physics engines that can stand behind a world."""
+STEP = 0.001  # [s] of physics
+
 
 @dataclass(frozen=True)
 class SensorParameters:
@@ -82,6 +88,7 @@ class DriverParameters:
 class WorldParameters:
     """The physical world. Ranges are drawn from once, when a world is made, by its seed."""
 
+    engine: str = "pybullet"  # or mujoco, the project's extra of that name
     friction: tuple[float, float] = (0.6, 1.0)  # range of the friction coefficient on the carpet
     mass_scale: float = 1.0  # all masses and inertias by those of the robot file, that motion control does not know of
     mass_spread: float = 0.05  # each link's mass and inertia: +- this share
@@ -104,6 +111,8 @@ class WorldParameters:
         Raises:
             ValueError: if one is out of its range.
         """
+        if self.engine not in ENGINES:
+            raise ValueError(f"engine is {self.engine!r}; expected {' or '.join(ENGINES)}")
         for name in ("friction", "joint_friction", "sensor_delay"):
             low, high = getattr(self, name)
             if not 0.0 <= low <= high:
@@ -151,3 +160,26 @@ class WorldParameters:
         return cls(
             friction=(0.8, 0.8), mass_spread=0.0, joint_friction=(0.0, 0.0), sensor_delay=(0, 0), sensors=sensors
         )
+
+
+def materials_of(parameters: WorldParameters, friction: float | None = None) -> Materials:
+    """Return what a world is made of.
+
+    pybullet's spring of a contact is implicit: its force is that of the depth after the step, K (d + h d') + B d', so
+    it damps with B + h K. That is how its ball bounces, and what other engines have to be given.
+
+    Args:
+        parameters: Of the world.
+        friction: Of its carpet, as drawn; None for the middle of the range. Joint friction is the middle of its range.
+    """
+    p = parameters
+    return Materials(
+        friction=sum(p.friction) / 2 if friction is None else friction,
+        ball_mass=p.ball_mass,
+        ball_rolling_deceleration=p.ball_rolling_deceleration,
+        ball_stiffness=p.ball_stiffness,
+        ball_damping=p.ball_damping + STEP * p.ball_stiffness,
+        net_stiffness=p.net_stiffness,
+        net_damping=p.net_damping + STEP * p.net_stiffness,
+        joint_friction=sum(p.joint_friction) / 2,
+    )

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_description.materials import GRAVITY
 from tulip_description.quaternion import quaternion_product
 from tulip_description.robot import Foot, Robot
 from tulip_description.robot_io import Sensors
 from tulip_sim.parameters import SensorParameters
 
 Array = NDArray[np.float64]
-GRAVITY = 9.81  # [m/s^2]
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -12,13 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from tulip_description import frames
 from tulip_description.model import floating_model
 from tulip_description.planar import Pose2D
-from tulip_description.quaternion import quaternion_matrix
 from tulip_description.robot import Robot
 from tulip_description.robot_io import JointCommand, Sensors
-from tulip_sim import bodies
 from tulip_sim.driver import MILLISECOND, JointDriver
+from tulip_sim.engine import RobotBody
 from tulip_sim.parameters import WorldParameters
-from tulip_sim.physics import pybullet
 from tulip_sim.sensors import BodyState, SensorModel, cell_forces
 from tulip_sim.touches import TouchCounter
 
@@ -26,55 +25,42 @@ Array = NDArray[np.float64]
 
 
 class SimulatedRobot:
-    """A body in a physics engine, with what is its own: driver, sensor errors, masses and joint friction.
+    """A body in a physics engine, with what is its own: driver, sensor errors and joint friction.
 
     Attributes:
         robot: What it is like, as motion control knows it.
-        body: Its number in the physics engine.
-        index: The engine's number of each link and joint, by name.
+        body: Where it lives in the physics engine.
         joint_positions, joint_velocities: (n,) after the last step of physics [rad], [rad/s].
         dry_friction: (n,) of each joint, as drawn [N m].
     """
 
     def __init__(
         self,
-        client: int,
         robot: Robot,
+        body: RobotBody,
         parameters: WorldParameters,
         start: Array,
         pose: Pose2D,
-        carpet: int,
         rng: tuple[np.random.Generator, np.random.Generator],
-        true_body: Robot | None = None,
     ) -> None:
-        """Load it, at rest, its soles on the ground; it holds its posture until the first commands come.
+        """Put it on the field, at rest, its soles on the ground; it holds its posture until the first commands come.
 
         Args:
-            client: Physics engine.
             robot: What it is like, as motion control may know.
+            body: In the physics engine.
             parameters: Physics and sensors.
             start: (n,) posture at the start [rad], feet flat.
             pose: Of base_link in map, seen from above.
-            carpet: The ground's body, which the soles feel.
-            rng: Where its own masses and friction come from, and the errors of its sensors.
-            true_body: Whose masses, CoMs and inertias it has; None for those of `robot`.
+            rng: Where its own friction comes from, and the errors of its sensors.
 
         Raises:
-            ValueError: if start has a wrong shape, the feet of that posture are not level, or true_body is of another
-                shape than robot.
+            ValueError: if start has a wrong shape or the feet of that posture are not level.
         """
-        self.robot, self._client, self._parameters, self._carpet = robot, client, parameters, carpet
+        self.robot, self.body, self._parameters = robot, body, parameters
         self._start, self._start_height = start, _base_height(robot, start)
-        p, body = parameters, true_body or robot
-        if body.joints != robot.joints or [link.name for link in body.links] != [link.name for link in robot.links]:
-            raise ValueError("true_body has other links or joints than robot; expected other masses alone")
+        p = parameters
         physics_rng, sensor_rng = rng
-        spread = physics_rng.uniform(1.0 - p.mass_spread, 1.0 + p.mass_spread, len(robot.links))
-        self.body, self.index = bodies.add_robot(client, body, p.mass_scale * spread)
-        self._joint_indices = [self.index[name] for name in robot.joint_names]
-        self._foot_links = tuple(self.index[sole.link] for sole in robot.soles)
-        self._com_in_base = np.array(body.links[0].com)
-        n = len(self._joint_indices)
+        n = len(robot.joint_names)
         self.dry_friction = robot.effort_limits * physics_rng.uniform(*p.joint_friction, n)
         self._place(pose)
         self._driver = JointDriver(robot, p.driver, start)
@@ -110,24 +96,13 @@ class SimulatedRobot:
         effort = self._driver.torques(now, self.joint_positions, self.joint_velocities)
         self._effort_sum += effort
         self._effort_count += 1
-        pybullet.setJointMotorControlArray(
-            self.body,
-            self._joint_indices,
-            pybullet.TORQUE_CONTROL,
-            forces=(effort - self._friction_torque()).tolist(),
-            physicsClientId=self._client,
-        )
+        self.body.drive(effort - self._friction_torque())
         if now < self._push_end:
-            com, _ = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
-            pybullet.applyExternalForce(
-                self.body, -1, self._push_force.tolist(), com, pybullet.WORLD_FRAME, physicsClientId=self._client
-            )
+            self.body.push(self._push_force)
 
     def read_joints(self) -> None:
         """Take the joints' state after a step of physics."""
-        states = pybullet.getJointStates(self.body, self._joint_indices, physicsClientId=self._client)
-        self.joint_positions = np.array([state[0] for state in states])
-        self.joint_velocities = np.array([state[1] for state in states])
+        self.joint_positions, self.joint_velocities = self.body.joint_state()
 
     def measure(self, now: int) -> None:
         """Read the sensors if a reading is due at this millisecond."""
@@ -142,13 +117,10 @@ class SimulatedRobot:
             self._readings.popleft()
         return self._readings[0]
 
-    def count_touches(self, ball: int, now: int) -> None:
+    def count_touches(self, now: int) -> None:
         """Count what part of it has come to touch the ball in this step."""
-        touched = set()
-        for contact in pybullet.getContactPoints(self.body, ball, physicsClientId=self._client):
-            if contact[9] > 0.0:
-                touched.add({self._foot_links[0]: "left", self._foot_links[1]: "right"}.get(contact[3], "body"))
-        for part in touched:
+        left, right = (sole.link for sole in self.robot.soles)
+        for part in {{left: "left", right: "right"}.get(link, "body") for link in self.body.links_at_ball()}:
             self._touches[part].touch(now)
 
     def push(self, force: ArrayLike, milliseconds: int, now: int) -> None:
@@ -175,7 +147,7 @@ class SimulatedRobot:
             ValueError: if a number is not finite.
         """
         if pose is None:
-            position, (_, _, z, w), _ = self.base_pose()
+            position, (_, _, z, w), _ = self.body.base_pose()
             # Of all headings the one that takes the least turning from how the trunk lies.
             pose = Pose2D(float(position[0]), float(position[1]), 2.0 * math.atan2(float(z), float(w)))
         if not all(math.isfinite(value) for value in (pose.x, pose.y, pose.yaw)):
@@ -184,41 +156,17 @@ class SimulatedRobot:
         self._push_end = now
         self.joint_positions, self.joint_velocities = self._start.copy(), np.zeros(len(self._start))
 
-    def base_pose(self) -> tuple[Array, Array, Array]:
-        """Return (3,) place [m], (4,) quaternion x, y, z, w and (3, 3) rotation of base_link in map."""
-        com, orientation = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
-        quaternion = np.array(orientation)
-        rotation = quaternion_matrix(orientation)
-        return np.array(com) - rotation @ self._com_in_base, quaternion, rotation
-
-    def base_velocity(self, rotation: Array) -> tuple[Array, Array]:
-        """Return (3,) velocity [m/s] and (3,) angular velocity [rad/s] of base_link in map, given its rotation."""
-        linear, angular = pybullet.getBaseVelocity(self.body, physicsClientId=self._client)
-        x, y, z = (rotation @ self._com_in_base).tolist()
-        wx, wy, wz = angular
-        vx, vy, vz = linear
-        lever = (vx - wy * z + wz * y, vy - wz * x + wx * z, vz - wx * y + wy * x)
-        return np.array(lever), np.array(angular)
-
     def _place(self, pose: Pose2D) -> None:
-        client = self._client
         turn = np.array([0.0, 0.0, math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)])
-        base = np.array([pose.x, pose.y, self._start_height])
-        com = (
-            base + quaternion_matrix(turn.tolist()) @ self._com_in_base
-        )  # pybullet places the CoM, not the link's frame
-        pybullet.resetBasePositionAndOrientation(self.body, com.tolist(), turn.tolist(), physicsClientId=client)
-        pybullet.resetBaseVelocity(self.body, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], physicsClientId=client)
-        for index, angle in zip(self._joint_indices, self._start, strict=True):
-            pybullet.resetJointState(self.body, index, float(angle), 0.0, physicsClientId=client)
+        self.body.place(np.array([pose.x, pose.y, self._start_height]), turn, self._start)
 
     def _friction_torque(self) -> Array:
         torque: Array = self.dry_friction * np.tanh(self.joint_velocities / self._parameters.joint_friction_speed)
         return torque
 
     def _body_state(self, now: int) -> BodyState:
-        position, orientation, rotation = self.base_pose()
-        linear, angular = self.base_velocity(rotation)
+        position, orientation, rotation = self.body.base_pose()
+        linear, angular = self.body.base_velocity(rotation)
         return BodyState(
             stamp=now,
             joint_positions=self.joint_positions,
@@ -234,25 +182,33 @@ class SimulatedRobot:
 
     def _foot_cells(self) -> Array:
         """Return (2, 4) forces on the cells [N], from the contacts of the soles with the carpet."""
-        contacts = pybullet.getContactPoints(self.body, self._carpet, physicsClientId=self._client)
-        cells = np.zeros((2, 4))
-        for side, link in enumerate(self._foot_links):
-            own = [(contact[5], contact[9]) for contact in contacts if contact[3] == link and contact[9] > 0.0]
-            if not own:
-                continue
-            state = pybullet.getLinkState(self.body, link, physicsClientId=self._client)
-            (ox, oy, oz), (x, y, z, w) = state[4], state[5]
-            forward = (1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w))  # the sole's axes in map
-            left = (2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w))
-            sole_x, sole_y, _ = self.robot.soles[side].origin
-            places = []
-            for (px, py, pz), force in own:
-                dx, dy, dz = px - ox, py - oy, pz - oz
-                along = dx * forward[0] + dy * forward[1] + dz * forward[2]
-                across = dx * left[0] + dy * left[1] + dz * left[2]
-                places.append((along - sole_x, across - sole_y, force))
-            cells[side] = cell_forces(self.robot.feet[side], places)
-        return cells
+        return np.array([cell_forces(foot, self.body.sole_contacts(side)) for side, foot in enumerate(self.robot.feet)])
+
+
+def as_drawn(
+    robot: Robot, parameters: WorldParameters, rng: np.random.Generator, true_body: Robot | None = None
+) -> Robot:
+    """Return what a robot really is like: each link's mass and inertia off by a random share.
+
+    Args:
+        robot: What it is like, as motion control may know.
+        parameters: Say by how much.
+        rng: Of the physics.
+        true_body: Whose masses, CoMs and inertias it has before that; None for those of `robot`.
+
+    Raises:
+        ValueError: if true_body is of another shape than robot.
+    """
+    body = true_body or robot
+    if body.joints != robot.joints or [link.name for link in body.links] != [link.name for link in robot.links]:
+        raise ValueError("true_body has other links or joints than robot; expected other masses alone")
+    p = parameters
+    scales = p.mass_scale * rng.uniform(1.0 - p.mass_spread, 1.0 + p.mass_spread, len(robot.links))
+    links = []
+    for link, scale in zip(body.links, scales.tolist(), strict=True):
+        x, y, z = link.inertia
+        links.append(replace(link, mass=link.mass * scale, inertia=(x * scale, y * scale, z * scale)))
+    return replace(body, links=tuple(links))
 
 
 def _base_height(robot: Robot, joints: Array) -> float:

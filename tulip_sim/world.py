@@ -1,9 +1,8 @@
-"""The simulated world: pybullet at 1 kHz, one robot or several and a ball on the field, and the truth about them."""
+"""The simulated world: physics at 1 kHz, one robot or several and a ball on the field, and the truth about them."""
 
 from __future__ import annotations
 
 import math
-import weakref
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,16 +12,16 @@ from tulip_description.planar import Pose2D
 from tulip_description.posture import standing_posture
 from tulip_description.robot import Robot, load_robot
 from tulip_description.robot_io import JointCommand, Sensors
-from tulip_sim import bodies
 from tulip_sim.driver import MILLISECOND
+from tulip_sim.engine import Layout, make_physics
 from tulip_sim.parameters import WorldParameters
-from tulip_sim.physics import pybullet
 from tulip_sim.scenario import Scenario
-from tulip_sim.simulated_robot import SimulatedRobot
+from tulip_sim.simulated_robot import SimulatedRobot, as_drawn
 from tulip_sim.touches import TouchCounter
 from tulip_sim.truth import OtherRobot, Truth
 
 CONTACT_PERIOD = 4  # [ms] between looks at who touches the ball; a kick's contact lasts about 17 ms
+KEEPER = 0  # its number among the figures
 
 
 class World:
@@ -62,32 +61,23 @@ class World:
         self.field = field if field is not None else load_field()
         self.robot = robot if robot is not None else load_robot()
         seeds = np.random.default_rng(seed)
-        physics_rng, sensor_rng = seeds.spawn(2)
+        poses = (scenario.robot, *scenario.others)
+        rngs = [(physics_rng, sensor_rng) for physics_rng, sensor_rng in (seeds.spawn(2) for _ in poses)]
         start = standing_posture(self.robot).joint_positions if joint_positions is None else np.array(joint_positions)
         p = self.parameters
         self._now = 0
-        self.friction = float(physics_rng.uniform(*p.friction))
+        self.friction = float(rngs[0][0].uniform(*p.friction))
         """Of the carpet, as drawn."""
-        self._client = bodies.connect(p)
-        self._finalizer = weakref.finalize(self, _disconnect, self._client)
-        carpet = bodies.add_carpet(self._client, self.friction)
-        for goal in (self.field.own_goal, self.field.opponent_goal):
-            bodies.add_goal(self._client, goal, p)
-        if scenario.poles:
-            bodies.add_poles(self._client, self.field)
-        self._ball = bodies.add_ball(self._client, self.field.ball_radius, self.friction, p)
-        self._keeper = None if scenario.keeper is None else bodies.add_figure(self._client, scenario.keeper.pose)
-        for place in scenario.obstacles:
-            bodies.add_figure(self._client, place)
+        figures = (() if scenario.keeper is None else (scenario.keeper.pose,)) + scenario.obstacles
+        really = tuple(as_drawn(self.robot, p, rng, true_body) for rng, _ in rngs)
+        self.physics = make_physics(Layout(self.field, p, self.friction, scenario.poles, figures, really))
+        """The engine."""
         self._keeper_pose = None if scenario.keeper is None else scenario.keeper.pose
         self._keeper_touches = TouchCounter()
-        robots = []
-        for index, pose in enumerate((scenario.robot, *scenario.others)):
-            if index > 0:
-                physics_rng, sensor_rng = seeds.spawn(2)
-            rng = (physics_rng, sensor_rng)
-            robots.append(SimulatedRobot(self._client, self.robot, p, start, pose, carpet, rng, true_body))
-        self.robots = tuple(robots)
+        self.robots = tuple(
+            SimulatedRobot(self.robot, body, p, start, pose, rng)
+            for body, pose, rng in zip(self.physics.robots, poses, rngs, strict=True)
+        )
         self.place_ball(*scenario.ball)
 
     @property
@@ -115,12 +105,11 @@ class World:
         """
         if milliseconds < 0:
             raise ValueError(f"milliseconds is {milliseconds}; expected >= 0")
-        client = self._client
         for _ in range(milliseconds):
             for robot in self.robots:
                 robot.drive(self._now)
             self._move_keeper()
-            pybullet.stepSimulation(physicsClientId=client)
+            self.physics.step()
             self._now += MILLISECOND
             for robot in self.robots:
                 robot.read_joints()
@@ -136,15 +125,12 @@ class World:
     def truth(self, robot: int = 0) -> Truth:
         """Return what really is; the robot of that number is the one that the truth is about."""
         own = self.robots[robot]
-        position, orientation, rotation = own.base_pose()
-        linear, angular = own.base_velocity(rotation)
-        ball_position, ball_orientation = pybullet.getBasePositionAndOrientation(
-            self._ball, physicsClientId=self._client
-        )
-        ball_linear, ball_angular = pybullet.getBaseVelocity(self._ball, physicsClientId=self._client)
+        position, orientation, rotation = own.body.base_pose()
+        linear, angular = own.body.base_velocity(rotation)
+        ball = self.physics.ball()
         keeper = self.scenario.keeper
         others = [
-            OtherRobot(*other.base_pose()[:2], other.joint_positions) for other in self.robots if other is not own
+            OtherRobot(*other.body.base_pose()[:2], other.joint_positions) for other in self.robots if other is not own
         ]
         return Truth(
             stamp=self._now,
@@ -154,10 +140,10 @@ class World:
             base_angular_velocity=angular,
             joint_positions=own.joint_positions,
             joint_velocities=own.joint_velocities,
-            ball_position=np.array(ball_position),
-            ball_orientation=np.array(ball_orientation),
-            ball_linear_velocity=np.array(ball_linear),
-            ball_angular_velocity=np.array(ball_angular),
+            ball_position=ball.position,
+            ball_orientation=ball.orientation,
+            ball_linear_velocity=ball.linear_velocity,
+            ball_angular_velocity=ball.angular_velocity,
             keeper=self._keeper_pose,
             keeper_path=() if keeper is None or not keeper.path else keeper.points,
             foot_touches=own.foot_touches,
@@ -196,9 +182,8 @@ class World:
         if not all(math.isfinite(value) for value in (x, y, vx, vy)):
             raise ValueError(f"ball is at ({x}, {y}) m with ({vx}, {vy}) m/s; expected finite numbers")
         radius = self.field.ball_radius
-        pybullet.resetBasePositionAndOrientation(self._ball, [x, y, radius], [0, 0, 0, 1], physicsClientId=self._client)
-        pybullet.resetBaseVelocity(
-            self._ball, [vx, vy, 0.0], [-vy / radius, vx / radius, 0.0], physicsClientId=self._client
+        self.physics.place_ball(
+            np.array([x, y, radius]), np.array([vx, vy, 0.0]), np.array([-vy / radius, vx / radius, 0.0])
         )
 
     def set_upright(self, pose: Pose2D | None = None, robot: int = 0) -> None:
@@ -215,32 +200,23 @@ class World:
 
     def close(self) -> None:
         """Free the physics engine; the world cannot be used afterwards."""
-        self._finalizer()
+        self.physics.close()
 
     def _move_keeper(self) -> None:
         """Put the keeper's figure where it is in the next millisecond."""
         keeper, pose = self.scenario.keeper, self._keeper_pose
-        if keeper is None or pose is None or self._keeper is None or not keeper.moves:
+        if keeper is None or pose is None or not keeper.moves:
             return
         if keeper.path:
             pose = keeper.pose_at(self._now + MILLISECOND)
         else:
-            position, _ = pybullet.getBasePositionAndOrientation(self._ball, physicsClientId=self._client)
-            pose = keeper.after(pose, position[1], 1e-3)
+            pose = keeper.after(pose, float(self.physics.ball().position[1]), 1e-3)
         self._keeper_pose = pose
-        bodies.move_figure(self._client, self._keeper, pose)
+        self.physics.move_figure(KEEPER, pose)
 
     def _count_touches(self) -> None:
         """Count who has come to touch the ball in this step."""
         for robot in self.robots:
-            robot.count_touches(self._ball, self._now)
-        if self._keeper is not None and any(
-            contact[9] > 0.0
-            for contact in pybullet.getContactPoints(self._keeper, self._ball, physicsClientId=self._client)
-        ):
+            robot.count_touches(self._now)
+        if self.scenario.keeper is not None and self.physics.figure_at_ball(KEEPER):
             self._keeper_touches.touch(self._now)
-
-
-def _disconnect(client: int) -> None:
-    if pybullet.isConnected(client):
-        pybullet.disconnect(client)

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import bench
+import export_model
 import launch
 import match
 import pytest
@@ -61,6 +62,11 @@ TWO = ["--teams", "2", "--keeper", "dribble_and_kick", "--no-record"]
     ("main", "arguments", "words"),
     [
         (match.main, ["--mode", "grap"], "--mode is 'grap'; expected one of graph, lockstep"),
+        (match.main, ["--engine", "ode"], "--engine is 'ode'; expected pybullet or mujoco"),
+        (export_model.main, ["full"], "full exists already and is no empty folder; expected a new one"),
+        (export_model.main, ["new", "--formats", "obj"], "formats are obj; expected some of urdf, sdf, mjcf"),
+        (export_model.main, ["new", "--body", "broken.yaml"], "broken.yaml is not YAML"),
+        (export_model.main, ["new", "--variant", "table"], "expected the playing variant, or urdf alone"),
         (match.main, [*PORTLESS, "--scenario", "trail"], "no scenario 'trail'. Did you mean trial?"),
         (match.main, [*PORTLESS, "--parameters", "broken.yaml"], "no valid YAML: expected ',' or ']'"),
         (match.main, [*PORTLESS, "--parameters", "node.yaml"], "Did you mean vision?"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import time
 from dataclasses import replace
@@ -9,10 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from tulip_sim.bench import challenges, ilc, kick, push, simcheck, strategy, stress, walk
+from tulip_sim.bench import challenges, engines, ilc, kick, push, simcheck, strategy, stress, walk
 from tulip_sim.bench.runner import Bench, Row, run, save, write_results
+from tulip_sim.parameters import ENGINES
 
-BENCHES = (strategy.BENCH, walk.BENCH, push.BENCH, kick.BENCH, ilc.BENCH, stress.BENCH, simcheck.BENCH)
+BENCHES = (strategy.BENCH, walk.BENCH, push.BENCH, kick.BENCH, ilc.BENCH, stress.BENCH, simcheck.BENCH, engines.BENCH)
 
 TRIAL_ROWS: list[Row] = [
     {
@@ -120,6 +122,16 @@ def test_walks_are_summarized_one_line_a_walk() -> None:
         "| forward 0.6 m/s, 60 s | 1 of 2 | 0.55, 0.56 m/s | 0.20 m | 0.20 rad | 0.75, 0.80 | 9.0 rad/s |",
         "| slalom, 30 s | 1 of 1 |  |  | 0.10 rad | 0.80, 0.80 | 8.0 rad/s |",
     ]
+
+
+@pytest.mark.sim
+def test_a_short_stand_is_measured_on_each_engine_that_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(engines.TASKS, "stand", (None, 0.5))
+    names = [name for name in ENGINES if importlib.util.find_spec(name) is not None]
+    rows = [engines.measure("stand", name, 0) for name in names]
+    assert all(row["upright"] and row["time [s]"] == 0.5 for row in rows)
+    lines = [line for line in engines.summarize(rows) if line.startswith("| stand")]
+    assert [f"| {name} | 1 of 1 |" in line for name, line in zip(names, lines, strict=True)] == [True] * len(names)
 
 
 def test_good_kicks_are_carried_out_fast_and_leave_the_robot_upright() -> None:

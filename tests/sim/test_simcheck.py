@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tulip_description.materials import GRAVITY
 from tulip_description.model import floating_model
 from tulip_description.posture import standing_posture
 from tulip_description.robot import load_robot
@@ -30,7 +31,7 @@ from tulip_sim.simcheck.swing import swing
 
 ROBOT = load_robot()
 MODEL = floating_model(ROBOT)
-WEIGHT = ROBOT.mass * bodies.GRAVITY
+WEIGHT = ROBOT.mass * GRAVITY
 STANDING = standing_posture(ROBOT).joint_positions
 
 
@@ -84,7 +85,7 @@ def test_forward_dynamics_keep_energy_momentum_and_spin_in_the_air() -> None:
     assert np.abs(found.energy_error).max() < 1e-8 * found.kinetic.max()
     assert np.abs(found.momentum_error).max() < 1e-9 * WEIGHT
     assert np.abs(found.spin_error).max() < 1e-8 * np.linalg.norm(found.spin[0])
-    fallen = 0.5 * bodies.GRAVITY * 0.2**2
+    fallen = 0.5 * GRAVITY * 0.2**2
     speed = found.momentum[0, 2] / ROBOT.mass
     assert found.com[-1, 2] - found.com[0, 2] == pytest.approx(speed * 0.2 - fallen, abs=1e-9)
 
@@ -93,7 +94,7 @@ def test_springs_and_dampers_take_energy_and_explain_the_momentum() -> None:
     run = replace(drop(0.005), milliseconds=60).compute(STIFF)
     found = balance(ROBOT, run)
     touched = int(np.argmax(run.contact[:, 2] > 0.0))
-    assert touched == pytest.approx(1e3 * np.sqrt(2 * 0.005 / bodies.GRAVITY), abs=1.5)  # free fall
+    assert touched == pytest.approx(1e3 * np.sqrt(2 * 0.005 / GRAVITY), abs=1.5)  # free fall
     assert found.energy_error.max() < 1e-6
     assert found.energy_error[-1] < -0.03  # [J] the impact took something
     assert np.abs(found.momentum_error).max() < 1e-5
@@ -122,8 +123,8 @@ def test_an_impact_stops_the_soles_by_impulses_that_act_on_them_and_takes_energy
     q, before = experiment.state
     engine = RigidEngine(ROBOT, STANDING)
     engine.set_state(experiment.state)
-    after, impulses = engine.impact(before + 1e-3 * np.r_[0.0, 0.0, -bodies.GRAVITY, np.zeros(MODEL.nv - 3)])
-    falling = before + 1e-3 * np.r_[0.0, 0.0, -bodies.GRAVITY, np.zeros(MODEL.nv - 3)]
+    after, impulses = engine.impact(before + 1e-3 * np.r_[0.0, 0.0, -GRAVITY, np.zeros(MODEL.nv - 3)])
+    falling = before + 1e-3 * np.r_[0.0, 0.0, -GRAVITY, np.zeros(MODEL.nv - 3)]
     data = MODEL.createData()
     inertia = pin.crba(MODEL, data, q)
     jacobian = np.concatenate([sole_jacobian(MODEL, q, sole) for sole in SOLES])

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tulip_description.materials import GRAVITY
 from tulip_description.planar import Pose2D
 from tulip_description.robot import Robot, load_robot
 from tulip_sim.bench.body import Body
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.scenario import Scenario
 from tulip_sim.secret_body import secret_body, table_robot
-from tulip_sim.sensors import GRAVITY
 from tulip_sim.world import World
 
 ROBOT = load_robot()

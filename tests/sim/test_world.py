@@ -19,6 +19,7 @@ from tulip_description.posture import standing_posture
 from tulip_description.robot import JOINTS, LEG_JOINTS, VARIANTS, load_robot
 from tulip_description.robot_io import JointCommand
 from tulip_sim import bodies
+from tulip_sim.bullet_physics import BulletRobot
 from tulip_sim.keeper import Keeper
 from tulip_sim.parameters import SensorParameters, WorldParameters
 from tulip_sim.scenario import BALL_DISTANCE, Scenario, random_trial
@@ -64,7 +65,7 @@ def test_every_link_has_the_mass_com_and_inertia_of_the_model(variant: str) -> N
     robot = load_robot(variant)
     client = bodies.connect(EXACT)
     try:
-        body, index = bodies.add_robot(client, robot, np.ones(len(robot.links)))
+        body, index = bodies.add_robot(client, robot)
         assert pybullet.getNumJoints(body, physicsClientId=client) == len(robot.links) - 1
         for link in robot.links:
             info = pybullet.getDynamicsInfo(body, index[link.name], physicsClientId=client)
@@ -80,9 +81,15 @@ def test_every_link_has_the_mass_com_and_inertia_of_the_model(variant: str) -> N
         pybullet.disconnect(client)
 
 
+def pybullet_body(world: World) -> BulletRobot:
+    body = world.robots[0].body
+    assert isinstance(body, BulletRobot)
+    return body
+
+
 def _dynamics(world: World, link: str) -> tuple[Any, ...]:
-    only = world.robots[0]
-    return tuple(pybullet.getDynamicsInfo(only.body, only.index[link], physicsClientId=world._client))
+    only = pybullet_body(world)
+    return tuple(pybullet.getDynamicsInfo(only.number, only.index[link], physicsClientId=only.client))
 
 
 def test_masses_are_spread_by_the_seed_within_the_range(make_world: MakeWorld) -> None:
@@ -94,9 +101,7 @@ def test_masses_are_spread_by_the_seed_within_the_range(make_world: MakeWorld) -
 def test_all_masses_and_inertias_are_scaled_alike(make_world: MakeWorld) -> None:
     world = make_world(FAR, replace(EXACT, mass_scale=1.1))
     for link in world.robot.links:
-        info = pybullet.getDynamicsInfo(
-            world.robots[0].body, world.robots[0].index[link.name], physicsClientId=world._client
-        )
+        info = _dynamics(world, link.name)
         assert info[0] == pytest.approx(1.1 * link.mass)
         np.testing.assert_allclose(info[2], 1.1 * np.array(link.inertia), rtol=1e-6)
 
@@ -371,12 +376,10 @@ def test_sensor_errors_are_off_in_the_exact_world() -> None:
 def test_accelerations_in_free_flight_equal_the_model(make_world: MakeWorld, variant: str) -> None:
     robot = load_robot(variant)
     world = make_world(FAR, EXACT, robot=robot)
-    body = world.robots[0].body
-    base, _ = pybullet.getBasePositionAndOrientation(body, physicsClientId=world._client)
+    body = pybullet_body(world)
+    base, _ = pybullet.getBasePositionAndOrientation(body.number, physicsClientId=body.client)
     turn = [0.1, -0.2, 0.3, np.sqrt(1 - 0.14)]
-    pybullet.resetBasePositionAndOrientation(
-        world.robots[0].body, [base[0], base[1], 3.0], turn, physicsClientId=world._client
-    )
+    pybullet.resetBasePositionAndOrientation(body.number, [base[0], base[1], 3.0], turn, physicsClientId=body.client)
     effort = np.array([1.0, -3.0, 4.0, -5.0, 2.0, 0.3, -1.0, 2.0, -6.0, 3.0, -1.0, -0.2])
     zero = np.zeros(12)
     world.apply(JointCommand(1, 0, LEG_JOINTS, zero, zero, effort, zero, zero))

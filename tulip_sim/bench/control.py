@@ -14,6 +14,7 @@ from tulip_motion.lipm import GRAVITY
 from tulip_motion.parameters import CHOICES, MotionParameters
 from tulip_sim.bench.body import Body
 from tulip_sim.bench.runner import Bench, Row
+from tulip_sim.bench.tracking import Tracking
 from tulip_sim.timing import TICK
 
 SPEED = 0.2  # [m/s]
@@ -54,24 +55,21 @@ def measure(gait: str, feedforward: str, weighting: str, learning: str, seed: in
     body.go(0.3)
     command = WalkCommand(0, WalkMode.WALK, (SPEED, 0.0, 0.0))
     dt, ticks = TICK / 1000.0, round(DURATION * 1000 / TICK)
-    errors: list[tuple[float, float, float]] = []
+    tracking = Tracking()
     work, peak = 0.0, 0.0
     begin = body.world.truth().base_position[:2]
-    while len(errors) < ticks and not body.fallen:
+    while len(tracking) < ticks and not body.fallen:
         body.tick(command)
-        state, sensors = body.motion.state(), body.world.sensors()
-        joints = state.joint_positions - state.joint_positions_desired
-        com, zmp = (state.com - state.com_desired)[:2], state.zmp - state.zmp_desired
-        errors.append((float((joints**2).mean()), float((com**2).sum()), float((zmp**2).sum())))
+        tracking.add(body.motion.state())
+        sensors = body.world.sensors()
         power = sensors.joint_efforts[:12] * sensors.joint_velocities[:12]
         work += dt * float(np.maximum(power, 0.0).sum())
         if not body.fallen:
             peak = max(peak, float(np.abs(sensors.joint_efforts[:12]).max()))
     way = float(np.linalg.norm(body.world.truth().base_position[:2] - begin))
     weight = GRAVITY * body.world.robot.mass
-    upright = len(errors) if not body.fallen else max(len(errors) - round(FALLING / dt), 1)
-    # Without contact, in the air, there is no ZMP.
-    joint, com_error, zmp_error = (1000.0 * value for value in np.sqrt(np.nanmean(errors[:upright], axis=0)).tolist())
+    upright = len(tracking) if not body.fallen else max(len(tracking) - round(FALLING / dt), 1)
+    joint, com_error, zmp_error = tracking.rms(upright)
     return {
         "gait": gait,
         "feedforward": feedforward,
@@ -79,7 +77,7 @@ def measure(gait: str, feedforward: str, weighting: str, learning: str, seed: in
         "learning": learning,
         "seed": seed,
         "upright": not body.fallen,
-        "survived [s]": round(len(errors) * dt, 1),
+        "survived [s]": round(len(tracking) * dt, 1),
         "joint error RMS [mrad]": round(joint, 2),
         "CoM error RMS [mm]": round(com_error, 1),
         "ZMP error RMS [mm]": round(zmp_error, 1),

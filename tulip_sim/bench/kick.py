@@ -13,6 +13,7 @@ from tulip_description.planar import Pose2D, wrap_angle
 from tulip_motion.interface import KickGoal, KickKind, MotionMode, Side
 from tulip_sim.bench.body import Body
 from tulip_sim.bench.runner import Bench, Row
+from tulip_sim.parameters import WorldParameters
 from tulip_strategy.parameters import StrategyParameters
 
 PLACE_ERROR = 0.015  # [m] standard deviation of the ball's place, as strategy leaves it
@@ -26,7 +27,9 @@ WALK_ON = 5.0  # [s] after the start of a walking kick the robot has to walk sti
 TRIALS = 20  # of each kind
 
 
-def measure(kind: KickKind, side: Side, seed: int, direction: float, told: bool) -> Row:
+def measure(
+    kind: KickKind, side: Side, seed: int, direction: float, told: bool, world: WorldParameters | None = None
+) -> Row:
     """Kick once.
 
     Args:
@@ -35,10 +38,11 @@ def measure(kind: KickKind, side: Side, seed: int, direction: float, told: bool)
         seed: Of everything random.
         direction: Wanted [rad]: against straight ahead, or for a side kick straight to its side.
         told: Whether the kick is told where the ball lies.
+        world: Physics and sensors.
     """
     rng = np.random.default_rng([seed, side, kind])
     outward = 1.0 if side is Side.LEFT else -1.0
-    body = Body(10 * seed + side, Pose2D(-2.0, 0.0, 0.0), (0.0, -2.5))
+    body = Body(10 * seed + side, Pose2D(-2.0, 0.0, 0.0), (0.0, -2.5), world=world)
     body.go(0.5)
     walk = (WALK_SPEED, 0.0, 0.0) if kind is KickKind.WALKING else None
     if walk is not None:

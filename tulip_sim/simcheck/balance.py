@@ -11,10 +11,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from tulip_description.materials import GRAVITY
 from tulip_description.model import floating_model
 from tulip_description.quaternion import quaternion_matrix
 from tulip_description.robot import Robot
-from tulip_sim.bodies import GRAVITY
 from tulip_sim.simcheck.engine import Recording
 
 Array = NDArray[np.float64]

@@ -13,11 +13,12 @@ from tulip_description.quaternion import quaternion_matrix
 from tulip_description.robot import Robot
 from tulip_description.robot_io import JointCommand
 from tulip_sim import bodies
+from tulip_sim.bullet_physics import BulletRobot
 from tulip_sim.driver import MILLISECOND
-from tulip_sim.parameters import WorldParameters
+from tulip_sim.parameters import STEP, WorldParameters
 from tulip_sim.physics import pybullet
 from tulip_sim.simcheck.engine import Millisecond, State
-from tulip_sim.simulated_robot import SimulatedRobot
+from tulip_sim.simulated_robot import SimulatedRobot, as_drawn
 
 Array = NDArray[np.float64]
 
@@ -37,12 +38,12 @@ class BulletEngine:
         self.robot, self._substeps, self._now = robot, substeps, 0
         self._client = bodies.connect(parameters)
         self._finalizer = weakref.finalize(self, pybullet.disconnect, self._client)
-        pybullet.setPhysicsEngineParameter(fixedTimeStep=1e-3 / substeps, physicsClientId=self._client)
+        pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP / substeps, physicsClientId=self._client)
         self._carpet = bodies.add_carpet(self._client, parameters.friction[0])
         unused = np.random.default_rng(0)
-        self._simulated = SimulatedRobot(
-            self._client, robot, parameters, start, Pose2D(), self._carpet, (unused, unused)
-        )
+        really = as_drawn(robot, parameters, unused)
+        self._body = BulletRobot(self._client, really, self._carpet)
+        self._simulated = SimulatedRobot(robot, self._body, parameters, start, Pose2D(), (unused, unused))
         self._com = np.array(robot.links[0].com)
         self._push, self._push_end = np.zeros(3), 0
 
@@ -50,8 +51,8 @@ class BulletEngine:
     def state(self) -> State:
         """The state now."""
         own = self._simulated
-        position, quaternion, rotation = own.base_pose()
-        linear, angular = own.base_velocity(rotation)
+        position, quaternion, rotation = own.body.base_pose()
+        linear, angular = own.body.base_velocity(rotation)
         return State(
             np.concatenate([position, quaternion, own.joint_positions]),
             np.concatenate([rotation.T @ linear, rotation.T @ angular, own.joint_velocities]),
@@ -65,10 +66,14 @@ class BulletEngine:
         # pybullet wants place and velocity of the trunk's CoM.
         linear = rotation @ (state.v[:3] + np.cross(state.v[3:6], self._com))
         angular = rotation @ state.v[3:6]
-        pybullet.resetBasePositionAndOrientation(own.body, com.tolist(), state.q[3:7].tolist(), physicsClientId=client)
-        pybullet.resetBaseVelocity(own.body, linear.tolist(), angular.tolist(), physicsClientId=client)
+        pybullet.resetBasePositionAndOrientation(
+            self._body.number, com.tolist(), state.q[3:7].tolist(), physicsClientId=client
+        )
+        pybullet.resetBaseVelocity(self._body.number, linear.tolist(), angular.tolist(), physicsClientId=client)
         for name, angle, speed in zip(self.robot.joint_names, state.q[7:], state.v[6:], strict=True):
-            pybullet.resetJointState(own.body, own.index[name], float(angle), float(speed), physicsClientId=client)
+            pybullet.resetJointState(
+                self._body.number, self._body.index[name], float(angle), float(speed), physicsClientId=client
+            )
         own.read_joints()
 
     def apply(self, command: JointCommand) -> str:
@@ -100,7 +105,7 @@ class BulletEngine:
     def _contact_impulse(self) -> Array:
         """Return (6,) the ground's impulse in the last step of physics and its moment about the origin."""
         impulse = np.zeros(6)
-        for point in pybullet.getContactPoints(self._simulated.body, self._carpet, physicsClientId=self._client):
+        for point in pybullet.getContactPoints(self._body.number, self._carpet, physicsClientId=self._client):
             axes, sizes = np.array([point[7], point[11], point[13]]), np.array([point[9], point[10], point[12]])
             force = sizes @ axes  # pressing, and friction both ways
             impulse[:3] += force
@@ -108,5 +113,5 @@ class BulletEngine:
         return impulse * 1e-3 / self._substeps
 
     def _depth(self) -> float:
-        points = pybullet.getClosestPoints(self._simulated.body, self._carpet, 1.0, physicsClientId=self._client)
+        points = pybullet.getClosestPoints(self._body.number, self._carpet, 1.0, physicsClientId=self._client)
         return -min((point[8] for point in points), default=1.0)

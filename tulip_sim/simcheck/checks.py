@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tulip_sim.bodies import GRAVITY
+from tulip_description.materials import GRAVITY
 from tulip_sim.simcheck.balance import Balance
 from tulip_sim.simcheck.engine import Recording
 

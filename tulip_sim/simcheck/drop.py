@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.optimize import root
 
 from tulip_description import frames
+from tulip_description.materials import GRAVITY
 from tulip_description.model import floating_model
 from tulip_description.posture import standing_posture
 from tulip_description.robot import JOINTS, Robot, load_robot
-from tulip_sim.bodies import GRAVITY
 from tulip_sim.simcheck.engine import Engine, State
 from tulip_sim.simcheck.experiment import Experiment, command, on_ground
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
-from tulip_sim.bodies import GRAVITY
+from tulip_description.materials import GRAVITY
 from tulip_sim.simcheck import checks, differences
 from tulip_sim.simcheck.balance import Balance, balance
 from tulip_sim.simcheck.checks import Check

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from tulip_description.materials import GRAVITY
 from tulip_description.posture import standing_posture
 from tulip_description.robot import LEG_JOINTS, Robot, load_robot
-from tulip_sim.bodies import GRAVITY
 from tulip_sim.simcheck.engine import Engine, State
 from tulip_sim.simcheck.experiment import Experiment, command, loosened
 

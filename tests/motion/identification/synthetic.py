@@ -8,11 +8,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from tulip_description.materials import GRAVITY
 from tulip_description.model import Side, floating_model, joint_indices, sole_model
 from tulip_description.robot import HEAD_JOINTS, Robot
 from tulip_motion.identification.static_measurement import StaticMeasurement
 from tulip_sim.parameters import SensorParameters
-from tulip_sim.sensors import GRAVITY, cell_forces
+from tulip_sim.sensors import cell_forces
 
 Array = NDArray[np.float64]
 Held = list[tuple[Side, Array]]

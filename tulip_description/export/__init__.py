@@ -1,0 +1,1 @@
+"""The robot, the field and the ball as files for other programs: URDF, SDF and MJCF."""
