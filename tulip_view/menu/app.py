@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
+from collections.abc import Callable
 from typing import ClassVar
 
 from rich.console import RenderableType
@@ -21,7 +22,7 @@ from tulip_view.menu.dialogs import Choice, Pushes
 from tulip_view.menu.sight import Robot, Sight
 from tulip_view.menu.speeds import STANDING, Speeds
 
-LOOK = 0.1  # [s] between two looks at the robot
+LOOK = 0.2  # [s] between two looks at the robot
 BEGIN, END = "begin the experiment: the robot stands on one foot, then on the other", "end it: go home and stand"
 
 
@@ -31,7 +32,7 @@ class Menu(App[None]):
     ENABLE_COMMAND_PALETTE = False
     CSS = """
         Static { height: auto; }
-        #headline { max-height: 2; }
+        #headline { max-height: 3; }
         #outcomes { height: 2; }
         #nodes { height: 5fr; border-top: solid $foreground; }
         #said { height: 2fr; border-top: solid $foreground; }
@@ -108,20 +109,21 @@ class Menu(App[None]):
         self._show()
 
     def _show(self) -> None:
+        """Draw those parts anew in which there is something new."""
         sight, walk = self._sight, (self._speeds.wanted, self._speeds.in_walk_test)
-        self._update("headline", (sight.robot, sight.missing, sight.state, sight.sum), panels.headline(sight))
-        self._update("state", (sight.command, sight.game, sight.doing, sight.mode, sight.reason, sight.time,
-                               sight.recording, sight.experiment), panels.state(sight))  # fmt: skip
-        self._update("walk", walk, panels.walk(*walk))
-        self._update("outcomes", (sight.outcomes, self._hint), panels.outcomes(sight, self._hint))
-        self._update("nodes", sight.nodes, panels.nodes(sight))
-        self._update("said", sight.said, panels.said(sight))
+        now = sight.time if sight.time is None else int(sight.time)
+        state = sight.command, sight.game, sight.doing, sight.mode, sight.reason, now, sight.recording, sight.experiment
+        self._update("headline", (sight.missing, sight.state, sight.sum), lambda: panels.headline(sight))
+        self._update("state", state, lambda: panels.state(sight))
+        self._update("walk", walk, lambda: panels.walk(*walk))
+        self._update("outcomes", (sight.outcomes, self._hint), lambda: panels.outcomes(sight, self._hint))
+        self._update("nodes", sight.nodes, lambda: panels.nodes(sight))
+        self._update("said", sight.said, lambda: panels.said(sight))
 
-    def _update(self, name: str, values: object, content: RenderableType) -> None:
-        """Draw a part anew, if there is something new in it."""
+    def _update(self, name: str, values: object, draw: Callable[[], RenderableType]) -> None:
         if name not in self._shown or self._shown[name] != values:
             self._shown[name] = values
-            self._parts[name].update(content)
+            self._parts[name].update(draw())
 
     def action_limp(self) -> None:
         """Make the robot limp, whatever is open; an experiment, which has the legs, is ended, too."""
@@ -190,7 +192,8 @@ class Menu(App[None]):
         self._table.scroll_relative(y=sign * max(1, self._table.size.height - 1), animate=False)
 
     def _walks(self) -> bool:
-        """Return whether keys that make it walk shall do so; else say which key comes first."""
+        """Return whether keys that make it walk shall do so, as of now; else say which key comes first."""
+        self.refresh_sight()
         if not self._speeds.in_walk_test:
             self._hint = "press w for the walk test first: it walks by the arrow keys, q and e"
             self._show()
@@ -201,5 +204,5 @@ class Menu(App[None]):
         self._show()
 
     def _send(self, wish: Wish) -> None:
-        self._speeds.forget()
+        self._speeds.leave()
         self._robot.wish(wish)

@@ -42,7 +42,7 @@ def state(sight: Sight) -> Table:
     elif command is not None and command.request is not UserRequest.PLAY:
         wish.append(f" (strategy {command.strategy})", "not bold")
     mode = Text.assemble((sight.mode or "no word from motion", "bold"), f": {sight.reason}" if sight.reason else "")
-    time = f"time {sight.time:.1f} s" if sight.time is not None else "no time"
+    time = f"time {int(sight.time)} s" if sight.time is not None else "no time"
     table.add_row("game", sight.game or "no word from game_input", time)
     table.add_row("wish", wish, _recording(sight.recording))
     table.add_row("does", sight.doing or "no word from strategy", _experiment(sight.experiment))

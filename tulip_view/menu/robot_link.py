@@ -127,14 +127,14 @@ class RobotLink(Node):
             served = [name for name, _ in self.get_service_names_and_types()]
             tail = f"/{topics.SET_USER_COMMAND.name}"
             found = sorted({name.removesuffix(tail).strip("/") for name in served if name.endswith(tail)})
-            self._elsewhere = monotonic(), found
+            self._elsewhere = monotonic(), [name for name in found if name != self._robot]
         where = f"namespace /{self._robot}" if self._robot else "no namespace"
         domain = os.environ.get("ROS_DOMAIN_ID", "0")
         others = [f"--namespace {name}" if name else "no --namespace" for name in self._elsewhere[1]]
-        instead = f"; there are robots with {', '.join(others)}" if others else ""
+        instead = f" (but robots do with {', '.join(others)})" if others else ""
         return (
-            f"Node user_input does not run in {where} of ROS_DOMAIN_ID {domain}{instead}."
-            " Start it: python3 scripts/launch.py. The menu goes on as soon as it is there."
+            f"node user_input does not run in {where} of ROS_DOMAIN_ID {domain}{instead}."
+            " Start it, the menu goes on then: python3 scripts/launch.py"
         )
 
 

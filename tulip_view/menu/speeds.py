@@ -28,8 +28,9 @@ class Speeds:
 
     @property
     def in_walk_test(self) -> bool:
-        """Whether the robot does the walk test, whoever has begun it."""
-        return self._heard is not None and self._heard.request is UserRequest.WALK_TEST
+        """Whether the robot does the walk test, whoever has begun it, or will at once."""
+        heard = self._heard is not None and self._heard.request is UserRequest.WALK_TEST
+        return heard or bool(self._sent)
 
     def change(self, axis: int, sign: int) -> Velocity:
         """Go a step faster or slower, up to the limits of the walk test.
@@ -53,9 +54,14 @@ class Speeds:
         return velocity
 
     def forget(self) -> None:
-        """Forget what is on its way, since a wish was refused or another one was sent: the robot's own holds."""
+        """Forget what is on its way, since a wish was refused: the robot's own velocity holds."""
         self._sent.clear()
         self.wanted = self._heard.velocity if self._heard is not None else STANDING
+
+    def leave(self) -> None:
+        """End the walk test here at once, since this face wants something else."""
+        self._heard = None
+        self.forget()
 
     def hear(self, command: UserCommand) -> None:
         """Take the command that holds.
