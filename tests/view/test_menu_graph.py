@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from menu_screen import Screen, use_menu
@@ -13,6 +14,7 @@ from menu_screen import Screen, use_menu
 from tulip_msgs.msg import GroundTruth, UserCommand
 from tulip_ros import topics
 from tulip_ros.launch import Launcher
+from tulip_ros.log_file import Log
 from tulip_ros.plan import make_plan
 from tulip_view.menu.robot_link import RobotLink, linked
 
@@ -24,9 +26,11 @@ MASS = 23.0  # [kg]
 
 
 @contextmanager
-def running(logs: Path, *nodes: str, driver: str | None = None) -> Iterator[Launcher]:
-    values = {"driver": {"scenario": "open", "camera": False, "referee": False, "wait_for": list(nodes)}}
-    with Launcher(make_plan(list(nodes), driver, values=values if driver else {}), logs) as launcher:
+def running(
+    logs: Path, *nodes: str, driver: str | None = None, values: dict[str, dict[str, Any]] | None = None
+) -> Iterator[Launcher]:
+    own = {"driver": {"scenario": "open", "camera": False, "referee": False, "wait_for": list(nodes)}} if driver else {}
+    with Launcher(make_plan(list(nodes), driver, values={**own, **(values or {})}), logs) as launcher:
         yield launcher
 
 
@@ -110,3 +114,30 @@ def test_push_moves_the_simulated_robot_the_way_it_says(tmp_path: Path, key: str
     with running(tmp_path, "motion", "user_input", driver="sim"), linked("") as robot:
         ears = Ears(robot)
         use_menu(robot, use)
+
+
+@pytest.mark.sim
+def test_identification_is_begun_watched_recorded_and_ended_by_limp(tmp_path: Path):
+    async def use(screen: Screen) -> None:
+        await screen.until_text("identification: i begins", "not recording")
+        await screen.press("r")
+        await screen.until_text("recording: taken", "RECORDING")
+        await screen.press("i", "1")
+        await screen.until_text("identification: taken", "identification 0/18, shift")
+        await screen.press("l")
+        await screen.until_text("end of the identification: taken", "identification 0/18, aborted: on request")
+        await screen.press("r")
+        await screen.until_text("end of the recording: taken", "not recording")
+
+    values = {
+        "identify": {"plan.postures": 9, "plan.candidates": 40, "at_once": False},
+        "recorder": {"start": False, "folder": str(tmp_path / "recordings")},
+    }
+    with (
+        running(tmp_path, "identify", "user_input", "recorder", driver="sim", values=values),
+        linked("") as robot,
+    ):
+        use_menu(robot, use)
+    (file,) = (tmp_path / "recordings").glob("*/*.mcap")
+    with Log(file) as log:
+        assert log.topics["/identification/progress"].messages > 0

@@ -75,7 +75,7 @@ class IdentifyNode(ComponentNode):
     def _on_begin(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self._experiment.fallen:
             response.message = "the robot has fallen: set it upright, and start node identify again"
-        elif not self._experiment.finished:
+        elif self._experiment.progress.postures and not self._experiment.finished:
             response.message = "the experiment is under way"
         else:
             self._experiment = self._make_experiment(self._plans)
