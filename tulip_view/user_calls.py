@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import Future
+from threading import RLock
 from typing import Any
 
 from rclpy.client import Client
@@ -13,6 +14,7 @@ from rclpy.node import Node
 from tulip_ros import topics
 from tulip_ros.asking import Asker, NotServedError
 from tulip_ros.topics import Service
+from tulip_strategy.interface import UserRequest
 from tulip_strategy.user_input import Wish
 from tulip_view.outcome import PUSHES, Outcome
 
@@ -35,6 +37,9 @@ class UserCalls:
             tell: Is told each outcome, from the node's thread or the caller's.
         """
         self._asker, self._tell = asker, tell
+        self._order = RLock()  # of wishes: answers come in another thread
+        self._walk_is_asked = False
+        self._next_walk: Wish | None = None
 
         def client(service: Service, namespace: str = robot) -> Client:
             return node.create_client(service.type, f"/{namespace}/{service.name}".replace("//", "/"))
@@ -58,11 +63,32 @@ class UserCalls:
         return bool(self._experiments[False].service_is_ready())
 
     def wish(self, wish: Wish) -> None:
-        """Tell the robot what the user wants."""
+        """Tell the robot what the user wants.
+
+        While the answer to a walk test is due, of further ones only the newest waits, and any other wish goes before it
+        and in its place: a key that is held down must not fill the queue of a robot that is slow to answer.
+        """
+        with self._order:
+            self._next_walk = None
+            if self._walk_is_asked and wish.request is UserRequest.WALK_TEST:
+                self._next_walk = wish
+            else:
+                self._send(wish)
+
+    def _send(self, wish: Wish) -> None:
         request = topics.SET_USER_COMMAND.type.Request(
             request=wish.request.value, strategy=wish.strategy, velocity=list(wish.velocity), argument=wish.argument
         )
-        self._ask(self._wishes, request, wish.request.name.lower().replace("_", " "), NO_USER_INPUT)
+        walks = wish.request is UserRequest.WALK_TEST
+        self._walk_is_asked |= walks
+        what = wish.request.name.lower().replace("_", " ")
+        self._ask(self._wishes, request, what, NO_USER_INPUT, self._walk_is_answered if walks else None)
+
+    def _walk_is_answered(self) -> None:
+        with self._order:
+            self._walk_is_asked, wish, self._next_walk = False, self._next_walk, None
+            if wish is not None:
+                self._send(wish)
 
     def push(self, direction: str, size: float, heading: float) -> None:
         """Push the simulated robot's trunk.
@@ -89,16 +115,18 @@ class UserCalls:
         what = "identification" if begin else "end of the identification"
         self._ask(client, client.srv_type.Request(), what, NO_EXPERIMENT)
 
-    def _ask(self, client: Client, request: Any, what: str, missing: str) -> None:
-        if not client.service_is_ready():
-            self._tell(Outcome(what, "not done", missing))
-            return
-        self._asker.ask(client, request).add_done_callback(lambda answer: self._answered(what, answer))
+    def _ask(
+        self, client: Client, request: Any, what: str, missing: str, then: Callable[[], None] | None = None
+    ) -> None:
+        def answered(answer: Future[Any]) -> None:
+            try:
+                said = answer.result()
+            except NotServedError as error:
+                self._tell(Outcome(what, "not done", str(error) if found else missing))
+            else:
+                self._tell(Outcome(what, "taken" if said.success else "refused", said.message))
+            if then is not None:
+                then()
 
-    def _answered(self, what: str, answer: Future[Any]) -> None:
-        try:
-            said = answer.result()
-        except NotServedError as error:
-            self._tell(Outcome(what, "not done", str(error)))
-        else:
-            self._tell(Outcome(what, "taken" if said.success else "refused", said.message))
+        found = client.service_is_ready()
+        self._asker.ask(client, request).add_done_callback(answered)

@@ -16,6 +16,7 @@ from tulip_strategy.behaviour.tree import STRATEGIES
 from tulip_strategy.interface import UserCommand, UserRequest
 from tulip_strategy.user_input import UserInput, UserInputParameters, Wish
 from tulip_view.menu import app
+from tulip_view.menu.dialogs import Choice, Pushes
 from tulip_view.menu.sight import NodeLine, Said, Sight
 from tulip_view.menu.speeds import Speeds
 from tulip_view.outcome import Outcome
@@ -156,6 +157,24 @@ def test_speeds_that_another_face_has_chosen_are_shown_and_changed_from_there():
         await screen.until_text("play goalkeeper", "w begins the walk test")
 
 
+@pytest.mark.parametrize("key", ["k", "p"])
+def test_keys_that_wait_for_a_question_when_limp_closes_it_have_no_effect(key: str):
+    robot = CoreRobot()
+
+    @using(robot)
+    async def _(screen: Screen) -> None:
+        await screen.press(key)
+        question = screen.app.screen
+        assert isinstance(question, Choice | Pushes)
+        await screen.press("l")
+        if isinstance(question, Pushes):
+            question.action_push("forward")
+        else:
+            question.end("left")
+        question.action_leave()
+        assert robot.pushes == [] and robot.wishes == [Wish(UserRequest.LIMP)]
+
+
 def command(velocity: tuple[float, float, float], sequence: int) -> UserCommand:
     return UserCommand(0, UserRequest.WALK_TEST, velocity=velocity, sequence=sequence)
 
@@ -172,6 +191,19 @@ def test_keys_pressed_faster_than_the_robot_answers_add_up():
     assert speeds.change(0, 1) == (0.45, 0.0, 0.0)
     speeds.forget()  # it was refused
     assert speeds.wanted == (0.4, 0.0, 0.0)
+
+
+def test_walking_asked_for_before_limp_does_not_bring_the_walk_test_back():
+    speeds = Speeds()
+    speeds.hear(command((0.0, 0.0, 0.0), 1))
+    speeds.change(0, 1)
+    speeds.leave()  # limp was sent
+    speeds.hear(command((0.05, 0.0, 0.0), 2))
+    assert not speeds.in_walk_test
+    speeds.hear(UserCommand(0, UserRequest.LIMP, sequence=3))
+    assert not speeds.in_walk_test
+    speeds.hear(command((0.1, 0.0, 0.0), 4))  # another face's
+    assert speeds.in_walk_test
 
 
 def test_a_refusal_is_shown_with_its_reason_and_takes_the_speed_back():

@@ -111,6 +111,15 @@ def test_keys_change_the_topic_the_screen_shows_it_and_limp_is_there_soon(tmp_pa
             until(lambda: "wish stand" in terminal.text)
         print(f"limp after {', '.join(f'{1000.0 * delay:.0f}' for delay in delays)} ms")
         assert statistics.median(delays) < SOON  # another program on this machine may hold back a single one
+        terminal.press("w", *["Up"] * 10, "l", *["Up"] * 5)  # all at once, as from a key that is held down
+        until(lambda: robot.commands[-1].request == UserCommand.LIMP)
+        limp = len(robot.commands)
+        terminal.press("w", "Up")
+        until(lambda: list(robot.commands[-1].velocity) == [0.05, 0.0, 0.0])
+        after = [each.velocity[0] for each in robot.commands[limp:]]
+        assert after == [0.0, 0.05] and robot.commands[limp].request == UserCommand.WALK_TEST
+        terminal.press("u")
+        until(lambda: "wish stand" in terminal.text)
         terminal.press("C-q")
         until(lambda: "menu ended with 0" in terminal.text)
         assert robot.commands[-1].request == UserCommand.STAND  # the last wish holds without a menu
@@ -118,9 +127,7 @@ def test_keys_change_the_topic_the_screen_shows_it_and_limp_is_there_soon(tmp_pa
 
 def test_a_terminal_without_colours_says_the_same(tmp_path: Path):
     with menu_in_terminal(tmp_path, "NO_COLOR=1 TERM=vt100") as (terminal, robot, until):
-        terminal.press("k")
-        until(lambda: "2 right" in terminal.text)
-        terminal.press("2")
+        terminal.press("k", "2")
         until(lambda: robot.commands[-1].argument == "right")
         until(lambda: "wish kick test right" in terminal.text and "kick test: taken" in terminal.text)
         until(lambda: "user_input ok" in terminal.text)

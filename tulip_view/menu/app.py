@@ -23,6 +23,7 @@ from tulip_view.menu.sight import Robot, Sight
 from tulip_view.menu.speeds import STANDING, Speeds
 
 LOOK = 0.2  # [s] between two looks at the robot
+ALWAYS = ("limp", "quit")
 BEGIN, END = "begin the experiment: the robot stands on one foot, then on the other", "end it: go home and stand"
 
 
@@ -39,28 +40,32 @@ class Menu(App[None]):
         #keys { text-style: bold; }
         VerticalScroll { scrollbar-size-vertical: 1; }
     """
+    # All of them before whatever has the focus: so keys that come at once are obeyed in their order, nothing can keep
+    # LIMP to itself, and no key that was pressed before it has an effect after it.
     BINDINGS: ClassVar[list[BindingType]] = [
-        # Before whatever has the focus: nothing, not even a field for text, may keep these to itself.
-        Binding("l,L", "limp", "limp", priority=True),
-        Binding("ctrl+q,ctrl+c", "quit", "quit", priority=True),
-        Binding("s", "wish('PLAY')", "start"),
-        Binding("x", "wish('STOP')", "stop"),
-        Binding("u", "wish('STAND')", "stand"),
-        Binding("c", "choose_strategy", "strategy"),
-        Binding("w", "walk_test", "walk test"),
-        Binding("up", "walk(0, 1)", "faster"),
-        Binding("down", "walk(0, -1)", "slower"),
-        Binding("left", "walk(1, 1)", "left"),
-        Binding("right", "walk(1, -1)", "right"),
-        Binding("q", "walk(2, 1)", "turn left"),
-        Binding("e", "walk(2, -1)", "turn right"),
-        Binding("space", "stand_still", "step in place"),
-        Binding("k", "kick_test", "kick test"),
-        Binding("p", "pushes", "push"),
-        Binding("r", "record", "record"),
-        Binding("i", "identify", "identify"),
-        Binding("pageup", "scroll_nodes(-1)", "nodes up"),
-        Binding("pagedown", "scroll_nodes(1)", "nodes down"),
+        Binding(keys, action, priority=True)
+        for keys, action in (
+            ("l,L", "limp"),
+            ("ctrl+q,ctrl+c", "quit"),
+            ("s", "wish('PLAY')"),
+            ("x", "wish('STOP')"),
+            ("u", "wish('STAND')"),
+            ("c", "choose_strategy"),
+            ("w", "walk_test"),
+            ("up", "walk(0, 1)"),
+            ("down", "walk(0, -1)"),
+            ("left", "walk(1, 1)"),
+            ("right", "walk(1, -1)"),
+            ("q", "walk(2, 1)"),
+            ("e", "walk(2, -1)"),
+            ("space", "stand_still"),
+            ("k", "kick_test"),
+            ("p", "pushes"),
+            ("r", "record"),
+            ("i", "identify"),
+            ("pageup", "scroll_nodes(-1)"),
+            ("pagedown", "scroll_nodes(1)"),
+        )
     ]
 
     def __init__(self, robot: Robot) -> None:
@@ -95,6 +100,10 @@ class Menu(App[None]):
         self.refresh_sight()
         self.set_interval(LOOK, self.refresh_sight)
         asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, self.exit)
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool:
+        """Return whether a key does what it does here: while a question is open, it alone has the others."""
+        return action in ALWAYS or len(self.screen_stack) == 1
 
     def refresh_sight(self) -> None:
         """Show what there is to see now."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 from rich.text import Text
 from textual import on
@@ -13,6 +13,8 @@ from textual.containers import Vertical
 from textual.events import Key
 from textual.screen import ModalScreen
 from textual.widgets import OptionList, Static
+
+T = TypeVar("T")
 
 SIZE, STEP, LEAST, MOST = 4.0, 0.5, 0.5, 15.0  # [N s] of a push
 STYLE = """
@@ -26,11 +28,25 @@ STYLE = """
 """
 
 
-class Choice(ModalScreen[str]):
+class Question(ModalScreen[T]):
+    """A question that can be left. Keys that come after its end are too late."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "leave", "leave")]
+
+    def end(self, answer: T | None = None) -> None:
+        """End with an answer, or with none."""
+        if self.is_current:
+            self.dismiss(answer)
+
+    def action_leave(self) -> None:
+        """End without an answer."""
+        self.end()
+
+
+class Choice(Question[str]):
     """A choice by number, or by arrow keys and Enter; Escape leaves without."""
 
     CSS = STYLE.format(name="Choice")
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "dismiss", "leave")]
 
     def __init__(self, title: str, options: tuple[str, ...]) -> None:
         """Make it.
@@ -52,20 +68,20 @@ class Choice(ModalScreen[str]):
         """Take a number."""
         if event.character is not None and event.character in "123456789"[: len(self._options)]:
             event.stop()
-            self.dismiss(self._options[int(event.character) - 1])
+            self.end(self._options[int(event.character) - 1])
 
     @on(OptionList.OptionSelected)
     def take(self, event: OptionList.OptionSelected) -> None:
         """Take what was chosen by Enter."""
-        self.dismiss(self._options[event.option_index])
+        self.end(self._options[event.option_index])
 
 
-class Pushes(ModalScreen[None]):
+class Pushes(Question[None]):
     """Pushes by arrow keys, as many as wanted, of a size that + and - change; Escape leaves."""
 
     CSS = STYLE.format(name="Pushes")
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("escape,p", "dismiss", "leave"),
+        Binding("p", "leave", "leave"),
         Binding("up", "push('forward')", "forward"),
         Binding("down", "push('backward')", "backward"),
         Binding("left", "push('to the left')", "to the left"),
@@ -96,7 +112,8 @@ class Pushes(ModalScreen[None]):
 
     def action_push(self, direction: str) -> None:
         """Push."""
-        self._push(direction, self._impulse)
+        if self.is_current:
+            self._push(direction, self._impulse)
 
     def action_change(self, sign: int) -> None:
         """Change the size of the next pushes."""

@@ -25,12 +25,13 @@ class Speeds:
         self.wanted = STANDING
         self._sent: deque[Velocity] = deque(maxlen=LONGEST)
         self._heard: UserCommand | None = None
+        self._left = False  # this face wants something else, and has not heard it yet
 
     @property
     def in_walk_test(self) -> bool:
         """Whether the robot does the walk test, whoever has begun it, or will at once."""
         heard = self._heard is not None and self._heard.request is UserRequest.WALK_TEST
-        return heard or bool(self._sent)
+        return not self._left and (heard or bool(self._sent))
 
     def change(self, axis: int, sign: int) -> Velocity:
         """Go a step faster or slower, up to the limits of the walk test.
@@ -49,7 +50,7 @@ class Speeds:
 
     def send(self, velocity: Velocity) -> Velocity:
         """Note that a velocity is sent, and return it."""
-        self.wanted = velocity
+        self.wanted, self._left = velocity, False
         self._sent.append(velocity)
         return velocity
 
@@ -59,9 +60,12 @@ class Speeds:
         self.wanted = self._heard.velocity if self._heard is not None else STANDING
 
     def leave(self) -> None:
-        """End the walk test here at once, since this face wants something else."""
-        self._heard = None
+        """End the walk test here at once, since this face wants something else.
+
+        Walking that is heard of until then was asked for before: no key may take it up again.
+        """
         self.forget()
+        self._left = True
 
     def hear(self, command: UserCommand) -> None:
         """Take the command that holds.
@@ -75,6 +79,7 @@ class Speeds:
         if command == self._heard:
             return
         self._heard = command
+        self._left &= command.request is UserRequest.WALK_TEST
         on_the_way = list(self._sent)
         self._sent.clear()
         if command.request is UserRequest.WALK_TEST and command.velocity in on_the_way:
