@@ -43,7 +43,7 @@ def slow() -> Iterator[Slow]:
 
         def on_wish(request: Any, response: Any) -> Any:
             asked.append((request.request, float(request.velocity[0])))
-            response.success = request.velocity[0] < 0.5
+            response.success = bool(request.velocity[0] < 0.5)
             response.message = "" if response.success else "too fast"
             return response
 
