@@ -84,10 +84,11 @@ class UserCalls:
         what = wish.request.name.lower().replace("_", " ")
         self._ask(self._wishes, request, what, NO_USER_INPUT, self._walk_is_answered if walks else None)
 
-    def _walk_is_answered(self) -> None:
+    def _walk_is_answered(self, served: bool) -> None:
+        """Send the speeds that wait, unless nobody has answered: by then nobody expects them any more."""
         with self._order:
             self._walk_is_asked, wish, self._next_walk = False, self._next_walk, None
-            if wish is not None:
+            if served and wish is not None:
                 self._send(wish)
 
     def push(self, direction: str, size: float, heading: float) -> None:
@@ -116,9 +117,10 @@ class UserCalls:
         self._ask(client, client.srv_type.Request(), what, NO_EXPERIMENT)
 
     def _ask(
-        self, client: Client, request: Any, what: str, missing: str, then: Callable[[], None] | None = None
+        self, client: Client, request: Any, what: str, missing: str, then: Callable[[bool], None] | None = None
     ) -> None:
         def answered(answer: Future[Any]) -> None:
+            said = None
             try:
                 said = answer.result()
             except NotServedError as error:
@@ -126,7 +128,7 @@ class UserCalls:
             else:
                 self._tell(Outcome(what, "taken" if said.success else "refused", said.message))
             if then is not None:
-                then()
+                then(said is not None)
 
         found = client.service_is_ready()
         self._asker.ask(client, request).add_done_callback(answered)

@@ -9,7 +9,7 @@ import pytest
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from tulip_ros import topics
+from tulip_ros import asking, topics
 from tulip_ros.asking import Asker
 from tulip_ros.run import session
 from tulip_strategy.interface import UserRequest
@@ -78,6 +78,19 @@ def test_limp_goes_out_at_once_and_no_speed_follows_it(slow: Slow):
     slow.answer(3)
     assert slow.asked == [(UserRequest.WALK_TEST, 0.0), (UserRequest.LIMP, 0.0), (UserRequest.WALK_TEST, 0.7)]
     assert str(slow.told[-1]) == "walk test: refused (too fast)"
+
+
+def test_speeds_are_dropped_when_nobody_answers(slow: Slow, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(asking, "ANSWER", 0.3)
+    slow.calls.wish(walk(0.1))
+    slow.calls.wish(walk(0.2))
+    while not slow.told:
+        slow.spin(0.05)
+    assert slow.told[0].verdict == "not done" and "does not answer" in slow.told[0].words
+    monkeypatch.setattr(asking, "ANSWER", 60.0)
+    slow.calls.wish(walk(0.3))
+    slow.answer(2)
+    assert [velocity for _, velocity in slow.asked] == [0.1, 0.3]  # the first was only late
 
 
 def test_who_is_not_there_is_named_with_the_remedy(slow: Slow):
