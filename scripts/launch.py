@@ -84,7 +84,8 @@ def keep_running(launcher: Launcher, namespace: str) -> None:
         ):
             names = [state.name for state in launcher.states()]
             # Who starts tools beside a running robot leaves the sum to the one who started the robot.
-            monitor = Monitor(node, names, publishes=bool({DRIVER, *ROBOT} & set(names)) and AGGREGATOR not in names)
+            publishes = bool({DRIVER, *ROBOT} & set(names)) and AGGREGATOR not in names
+            monitor = Monitor(node, names, publishes=publishes, states=launcher.states)
             while True:
                 spin(LOOK)
                 for line in launcher.poll():

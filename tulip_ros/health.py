@@ -39,6 +39,8 @@ class Health:
         self._checks: list[Check] = []
         self._found: list[Finding] = []  # by the checks and tallies of the last second
         self._events: Counter[str] = Counter()
+        self._figures: dict[str, str] = {}
+        self._due = False
         self._shown: dict[str, int] = {}
         self._warning = ""
         self._warned_at = 0.0
@@ -63,6 +65,16 @@ class Health:
         """Forget the stamps: time began anew."""
         for watch in self._inputs.values():
             watch.begin_anew()
+
+    def show(self, figure: str, value: str) -> None:
+        """Have a figure of another kind published beside the rates and counts, soon.
+
+        Args:
+            figure: A few fixed words, the key in the diagnostics, as in "recording".
+            value: What it is now.
+        """
+        self._due |= self._figures.get(figure) != value
+        self._figures[figure] = value
 
     def count(self, event: str, warning: str = "", times: int = 1) -> None:
         """Count an event.
@@ -93,11 +105,12 @@ class Health:
         if self._warning and now - self._warned_at < HOLD:
             findings.append(Finding(Level.WARNING, self._warning))
         level = worst(findings)
-        if due or level > self._level:
+        if due or self._due or level > self._level:
             self._publish(now, level, say(findings))
         self._level = level
 
     def _publish(self, now: float, level: Level, words: str) -> None:
+        self._due = False
         elapsed, self._last = max(now - self._last, 1e-3), now
         busy, self._processor_time = process_time() - self._processor_time, process_time()
         values = {
@@ -106,7 +119,7 @@ class Health:
         }
         self._shown = {name: watch.count for name, watch in self._inputs.items()}
         values |= {event: str(count) for event, count in sorted(self._events.items())}
-        values |= {"processor [%]": f"{100.0 * busy / elapsed:.1f}", "version": version()}
+        values |= self._figures | {"processor [%]": f"{100.0 * busy / elapsed:.1f}", "version": version()}
         if self._time.jumps:
             values["jumps of the clock"] = str(self._time.jumps)
         status = DiagnosticStatus(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from time import monotonic
 
@@ -19,6 +20,8 @@ from tulip_ros.launch import ProcessState
 from tulip_ros.nodes import DRIVER, ROBOT
 
 PERIOD = 1.0  # [s] of wall-clock time between two sums, as between two reports of a node
+RESTARTS = "restarts"
+"""Name of the figure that tells how many times a node was started again."""
 STYLES = {"ok": "green", "warning": "yellow", "error": "red", "stale": "red", "starting": "dim"}
 
 
@@ -30,7 +33,12 @@ class Monitor:
     """
 
     def __init__(
-        self, node: Node, expected: Sequence[str] = (), namespaces: Sequence[str] = ("",), publishes: bool = True
+        self,
+        node: Node,
+        expected: Sequence[str] = (),
+        namespaces: Sequence[str] = ("",),
+        publishes: bool = True,
+        states: Callable[[], Sequence[ProcessState]] = tuple,
     ) -> None:
         """Connect.
 
@@ -39,8 +47,9 @@ class Monitor:
             expected: Names of nodes that should be there, as in "motion" or, of several robots, "striker/motion".
             namespaces: Of the robots, below the node's own.
             publishes: False where another one publishes the sum.
+            states: Returns how the processes are, where this program started them: the sum tells their restarts.
         """
-        self._node = node
+        self._node, self._states = node, states
         self._aggregation = Aggregation((DRIVER, *ROBOT), expected, monotonic())
         for namespace in namespaces:
             topics.DIAGNOSTICS.within(namespace).subscribe_from(node, partial(self._on_diagnostics, namespace))
@@ -57,7 +66,10 @@ class Monitor:
         now = monotonic()
         root = self._node.get_namespace().rstrip("/") or "/robot"
         statuses = [_status(root, self._aggregation.summary(now))]
-        statuses += [_status(f"{root}/{name}", report) for name, report in self._aggregation.reports(now).items()]
+        restarts = {state.name: {RESTARTS: str(state.restarts)} for state in self._states()}
+        for name, report in self._aggregation.reports(now).items():
+            values = {**report.values, **restarts.get(name, {})}
+            statuses.append(_status(f"{root}/{name}", replace(report, values=values)))
         message = DiagnosticArray(status=statuses)
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._sender.publish(message)

@@ -28,6 +28,8 @@ from tulip_ros.topics import Quality
 LOOK = 0.5  # [s] between two looks for new topics and nodes, and at the disk
 WAIT = 20.0  # [s] at most for the nodes of `wait_for`
 COLLECT = 0.02  # [s] between two times that waiting messages are taken: one waking for many is cheap
+RECORDING = "recording"
+"""Name of the figure in the recorder's diagnostics that tells the file being written; "" while there is none."""
 PICTURES = {
     "compressed": (r"/(.*/)?camera/image_raw", r"/(.*/)?vision/picture"),
     "raw": (r"/(.*/)?camera/image_raw/compressed",),
@@ -135,6 +137,7 @@ class RecorderNode(ComponentNode):
         super().__init__("recorder", namespace=namespace)
         self.settings = self.load(settings or RecorderParameters())
         self.bag: Bag | None = None
+        self.health.show(RECORDING, "")
         self._rate = PictureRate(self.settings.picture_rate)
         self.inputs: dict[str, _Input] = {}
         self.lost: dict[str, int] = {}
@@ -187,6 +190,7 @@ class RecorderNode(ComponentNode):
                 f"Recording {bag.folder} cannot be written: {error.strerror}. Name another folder, or make room."
             ) from error
         self.bag, self.lost = bag, {}
+        self.health.show(RECORDING, str(bag.path))
         now = time.time_ns()  # a recording that begins later begins with what holds then
         self.write([(source, message._replace(received=now)) for source, message in self._latched.values()])
         self.get_logger().info(f"recording to {self.bag.path}")
@@ -201,7 +205,7 @@ class RecorderNode(ComponentNode):
         if self.bag is None:
             return "nothing was being recorded"
         self.write(self.take())
-        bag, self.bag = self.bag, None
+        bag = self._let_go()
         if bag is None:
             return "the recording ended early"
         bag.note(log_notes.LOST, {name: str(count) for name, count in sorted(self.lost.items())} or {"all": "0"})
@@ -302,7 +306,7 @@ class RecorderNode(ComponentNode):
 
     def give_up(self, error: OSError) -> None:
         """End a recording that cannot go on; what reached the disk is kept."""
-        bag, self.bag = self.bag, None
+        bag = self._let_go()
         if bag is None:
             return
         try:
@@ -312,6 +316,12 @@ class RecorderNode(ComponentNode):
         mend = "it is whole until then" if bag.ended else f"mend it: python3 scripts/recover.py {bag.folder}"
         reason = error.strerror or str(error)
         self.health.count("write errors", f"recording {bag.folder} ended early ({reason}); {mend}")
+
+    def _let_go(self) -> Bag | None:
+        """Write no more; return what was being written."""
+        bag, self.bag = self.bag, None
+        self.health.show(RECORDING, "")
+        return bag
 
     def on_start(self, request: Any, response: Any) -> Any:
         """Serve start_recording."""

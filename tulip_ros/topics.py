@@ -401,6 +401,9 @@ STOP_RECORDING = Service("stop_recording", StopRecording, "recorder", "end the r
 PAUSE_REPLAY = Service("replay/pause", Trigger, "replay", "hold the replay; of the log driver, too")
 RESUME_REPLAY = Service("replay/resume", Trigger, "replay", "go on with the replay")
 STEP_REPLAY = Service("replay/step", Trigger, "replay", "hold the replay, and let one step of it pass")
+BEGIN_IDENTIFICATION = Service(
+    "identification/begin", Trigger, "identify", "begin the experiment, or once more after its end"
+)
 ABORT_IDENTIFICATION = Service(
     "identification/abort", Trigger, "identify", "end the experiment: go home, put the foot down and stand"
 )
@@ -420,6 +423,7 @@ SERVICES: tuple[Service, ...] = (
     PAUSE_REPLAY,
     RESUME_REPLAY,
     STEP_REPLAY,
+    BEGIN_IDENTIFICATION,
     ABORT_IDENTIFICATION,
     KICK,
 )

@@ -13,6 +13,16 @@ _AXES = (("forward", "m/s"), ("left", "m/s"), ("turning", "rad/s"))
 
 
 @dataclass(frozen=True)
+class Wish:
+    """What a person wants, as the arguments of `UserInput.ask`."""
+
+    request: UserRequest
+    strategy: str = ""
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    argument: str = ""
+
+
+@dataclass(frozen=True)
 class UserInputParameters:
     """What a user may ask for."""
 

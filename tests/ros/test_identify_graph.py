@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from std_srvs.srv import Trigger
 
 from tulip_motion.identification.experiment_plan import PlanParameters
 from tulip_motion.identification.experiment_settings import ExperimentSettings
 from tulip_motion.identification.passages import Doing
 from tulip_motion.identification.progress import Progress
+from tulip_ros import topics
 from tulip_ros.launch import Launcher
 from tulip_ros.log_file import Log
 from tulip_ros.run import session
@@ -41,3 +44,37 @@ def test_abort_by_the_service_ends_in_a_stand_and_the_recording_says_why(tmp_pat
     with Log(record) as log:
         names = {name for name, topic in log.topics.items() if topic.messages}
     assert {"/identification/progress", "/joint_states", "/imu", "/foot_forces", "/legs/joint_command"} <= names
+
+
+def test_node_that_waits_stands_until_the_service_begins_the_experiment(tmp_path: Path):
+    settings = ExperimentSettings(plan=PlanParameters(postures=9, candidates=40), at_once=False)
+    with (
+        Launcher(experiment_nodes(settings, "sim", 1, tmp_path / "experiment"), tmp_path / "logs") as launcher,
+        session(Watcher, arguments=[], handle_signals=False) as (watcher, spin),
+    ):
+        begin = watcher.create_client(topics.BEGIN_IDENTIFICATION.type, topics.BEGIN_IDENTIFICATION.name)
+
+        def until(holds: Callable[[Progress], bool]) -> Progress:
+            end = time.monotonic() + LONGEST
+            while watcher.progress is None or not holds(watcher.progress):
+                assert time.monotonic() < end, watcher.progress
+                spin(0.1)
+                assert launcher.poll() == []  # no node died
+            return watcher.progress
+
+        def ask() -> tuple[bool, str]:
+            asked = begin.call_async(Trigger.Request())
+            until(lambda _: asked.done())
+            return asked.result().success, asked.result().message
+
+        waiting = until(lambda progress: progress.finished)
+        assert (waiting.doing, waiting.postures, waiting.held) == (Doing.STAND, 0, 0)
+        assert ask() == (True, "")
+        assert until(lambda progress: progress.doing is Doing.SHIFT).postures == 18
+        assert ask() == (False, "the experiment is under way")
+        watcher.abort()
+        ended = until(lambda progress: progress.finished)
+        assert (ended.doing, ended.reason) == (Doing.STAND, "on request")
+        assert ask() == (True, "")
+        again = until(lambda progress: not progress.finished)
+        assert (again.held, again.reason) == (0, "")

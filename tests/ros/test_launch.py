@@ -10,8 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 
-from tulip_ros import transport
+from tulip_ros import topics, transport
 from tulip_ros.aggregation import Report
 from tulip_ros.errors import BadInputError
 from tulip_ros.finding import Level
@@ -111,6 +112,12 @@ def test_log_folder_that_cannot_be_made_is_refused(tmp_path: Path):
         Launcher([], tmp_path / "file" / "logs")
 
 
+def figures(sums: list[DiagnosticArray]) -> dict[str, str]:
+    """Return what the newest sum tells of the recorder."""
+    statuses = sums[-1].status if sums else []
+    return {pair.key: pair.value for each in statuses if each.name.endswith("/recorder") for pair in each.values}
+
+
 @pytest.mark.ros
 def test_monitor_hears_a_launched_node_and_its_recording_ends_with_it(ros_domain: int, tmp_path: Path):
     values = {"recorder": {"path": str(tmp_path / "bag")}}
@@ -119,11 +126,16 @@ def test_monitor_hears_a_launched_node_and_its_recording_ends_with_it(ros_domain
         Launcher(plan, tmp_path / "logs") as launcher,
         session(lambda: ComponentNode("listener", namespace="striker"), ["test"], handle_signals=False) as (node, spin),
     ):
-        monitor = Monitor(node, ["recorder"])
+        sums: list[DiagnosticArray] = []
+        monitor = Monitor(node, ["recorder"], states=launcher.states)
+        topics.DIAGNOSTICS_AGG.subscribe_from(node, sums.append)
         assert monitor.summary() == Report(Level.OK, "waits for recorder")
         wait_for(lambda: spin(0.1) or "processor [%]" in monitor.reports()["recorder"].values)
         assert monitor.summary() == Report(Level.OK, "all nodes are well")
         assert monitor.table(launcher.states()).row_count == 1
+        wait_for(lambda: spin(0.1) or {"restarts", "recording"} <= figures(sums).keys())
+        assert figures(sums)["restarts"] == "0"
+        assert figures(sums)["recording"] == str(tmp_path / "bag" / "bag.mcap")
     assert (tmp_path / "bag" / "metadata.yaml").exists()
     assert launcher.states()[0].exit_code == 0
 

@@ -1,14 +1,10 @@
 from __future__ import annotations
 
-import io
 import math
-from collections.abc import Iterator
 
 import pytest
-from rich.console import Console
 
 from tulip_strategy.interface import UserCommand, UserRequest
-from tulip_strategy.menu import ENTRIES, Menu, Wish
 from tulip_strategy.user_input import UserInput, UserInputParameters
 
 STRATEGIES = ("dribble_and_kick", "goalkeeper")
@@ -65,56 +61,3 @@ def test_a_wish_that_cannot_be_is_refused_in_words_and_changes_nothing(
 def test_an_unknown_first_strategy_is_named() -> None:
     with pytest.raises(ValueError, match="strategy is 'x'; expected one of: dribble_and_kick"):
         UserInput(UserInputParameters(strategy="x"), STRATEGIES)
-
-
-def use_menu(monkeypatch: pytest.MonkeyPatch, *answers: str) -> tuple[list[Wish], str]:
-    """Type the answers, then end the input; return the wishes sent and what was shown."""
-    typed: Iterator[str] = iter(answers)
-
-    def read(_: str = "") -> str:
-        try:
-            return next(typed)
-        except StopIteration:
-            raise EOFError from None
-
-    monkeypatch.setattr("builtins.input", read)
-    sent: list[Wish] = []
-    user = user_input()
-
-    def send(wish: Wish) -> tuple[bool, str]:
-        sent.append(wish)
-        refusal = user.ask(0, wish.request, wish.strategy, wish.velocity, wish.argument)
-        return not refusal, refusal
-
-    screen = io.StringIO()
-    recorder = iter([(True, "recordings/now/now.mcap"), (False, "nothing was being recorded")])
-    Menu(Console(file=screen, width=100), send, lambda begin: next(recorder), STRATEGIES).run()
-    return sent, screen.getvalue()
-
-
-def test_the_menu_sends_every_wish(monkeypatch: pytest.MonkeyPatch) -> None:
-    sent, shown = use_menu(
-        monkeypatch, "s", "x", "u", "w", "0.2", "0", "-0.3", "k", "left", "l", "c", "goalkeeper", "q", "s"
-    )
-    assert sent == [
-        Wish(UserRequest.PLAY),
-        Wish(UserRequest.STOP),
-        Wish(UserRequest.STAND),
-        Wish(UserRequest.WALK_TEST, velocity=(0.2, 0.0, -0.3)),
-        Wish(UserRequest.KICK_TEST, argument="left"),
-        Wish(UserRequest.LIMP),
-        Wish(UserRequest.PLAY, strategy="goalkeeper"),
-    ]
-    assert all(words in shown for _, words, _ in ENTRIES)
-
-
-def test_the_menu_asks_again_after_a_wrong_key_and_shows_a_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
-    sent, shown = use_menu(monkeypatch, "z", "w", "5", "0", "0")
-    assert [wish.request for wish in sent] == [UserRequest.WALK_TEST]
-    assert "refused: forward velocity is 5.0 m/s" in shown
-
-
-def test_the_menu_begins_and_ends_a_recording_and_shows_where_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    sent, shown = use_menu(monkeypatch, "r", "e")
-    assert not sent
-    assert "taken: recordings/now/now.mcap" in shown and "refused: nothing was being recorded" in shown

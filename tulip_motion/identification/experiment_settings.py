@@ -20,6 +20,7 @@ class ExperimentSettings:
     plan: PlanParameters = field(default_factory=PlanParameters)
     posture: PostureParameters = field(default_factory=PostureParameters)
     experiment: ExperimentParameters = field(default_factory=ExperimentParameters)
+    at_once: bool = True  # begin by itself; else stand until service identification/begin is called
 
     @property
     def robot(self) -> Robot:

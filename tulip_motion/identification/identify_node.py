@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from std_srvs.srv import Trigger
 
-from tulip_motion.identification.experiment_settings import ExperimentSettings, make_experiment
+from tulip_motion.identification.experiment import Experiment
+from tulip_motion.identification.experiment_plan import FootPlan, make_plan
+from tulip_motion.identification.experiment_settings import ExperimentSettings
 from tulip_motion.messages import joint_command_to_message, progress_to_message, sensors_from_messages
 from tulip_ros import topics
 from tulip_ros.errors import BadInputError
@@ -23,8 +26,10 @@ class IdentifyNode(ComponentNode):
     def __init__(self) -> None:
         """Plan, which takes some seconds, and connect."""
         super().__init__("identify")
-        self._settings = self.load(ExperimentSettings())
+        p = self._settings = self.load(ExperimentSettings())
         try:
+            self._robot = p.robot
+            self._plans = make_plan(self._robot, p.plan, p.posture)
             self.begin_anew()
         except ValueError as error:
             raise BadInputError(f"Parameters of node 'identify': {error}") from error
@@ -33,12 +38,15 @@ class IdentifyNode(ComponentNode):
         self.listen(topics.JOINT_STATES, lambda message: self._on_sensor("joint_states", message))
         self.listen(topics.IMU, lambda message: self._on_sensor("imu", message))
         self.listen(topics.FOOT_FORCES, lambda message: self._on_sensor("foot_forces", message))
-        abort = topics.ABORT_IDENTIFICATION
-        self.create_service(abort.type, abort.name, self._on_abort)
+        for service, answer in (
+            (topics.BEGIN_IDENTIFICATION, self._on_begin),
+            (topics.ABORT_IDENTIFICATION, self._on_abort),
+        ):
+            self.create_service(service.type, service.name, answer)
 
     def begin_anew(self) -> None:
         """Make the core, and forget the sensors of before."""
-        self._experiment = make_experiment(self._settings)
+        self._experiment = self._make_experiment(self._plans if self._settings.at_once else ())
         self._sensors = SameStamp("joint_states", "imu", "foot_forces")
         self._tick = 0
 
@@ -59,6 +67,20 @@ class IdentifyNode(ComponentNode):
         self._tick += 1
         if self._tick % REPORT_TICKS == 0:
             self._progress.publish(progress_to_message(self._experiment.progress))
+
+    def _make_experiment(self, plans: Sequence[FootPlan]) -> Experiment:
+        """Return an experiment; without plans, one that only stands."""
+        return Experiment(self._robot, plans, self._settings.experiment)
+
+    def _on_begin(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self._experiment.fallen:
+            response.message = "the robot has fallen: set it upright, and start node identify again"
+        elif self._experiment.progress.postures and not self._experiment.finished:
+            response.message = "the experiment is under way"
+        else:
+            self._experiment = self._make_experiment(self._plans)
+            response.success = True
+        return response
 
     def _on_abort(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         experiment = self._experiment

@@ -12,6 +12,7 @@ import foxglove
 from foxglove.websocket import Capability, Parameter, StatusLevel
 
 from tulip_ros import topics
+from tulip_ros.asking import Asker
 from tulip_ros.raw_topic import RawTopic
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.serialized import time_at
@@ -48,7 +49,8 @@ class BridgeNode(ComponentNode):
         context = foxglove.Context()
         self._feeds = Feeds(self, context)
         self._publications = Publications(self)
-        self._node_settings = NodeSettings(self, self._tell_parameters)
+        asker = Asker(self)
+        self._node_settings = NodeSettings(self, asker, self._tell_parameters)
         # A loopback address that nobody guesses; only the door knows it.
         address = f"127.{'.'.join(str(1 + secrets.randbelow(254)) for _ in range(3))}"
         self._server = foxglove.start_server(
@@ -60,7 +62,7 @@ class BridgeNode(ComponentNode):
             supported_encodings=[ENCODING],
             context=context,
         )
-        self._offered_services = Services(self, self._server)
+        self._offered_services = Services(self, asker, self._server)
         self._clock_topic = RawTopic(self, topics.CLOCK.name, topics.CLOCK.type_name, topics.CLOCK.quality, waiting=1)
         self._stamp = 0
         try:

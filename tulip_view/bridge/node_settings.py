@@ -11,8 +11,8 @@ from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
+from tulip_ros.asking import Asker, NotServedError
 from tulip_ros.node_parameters import ParameterAsker
-from tulip_view.bridge.asking import NotServedError, ask
 
 
 class Answer(NamedTuple):
@@ -25,21 +25,22 @@ class Answer(NamedTuple):
 class NodeSettings:
     """Knows the parameters of all nodes; asks each node when it appears."""
 
-    def __init__(self, node: Node, learned: Callable[[list[Parameter]], None]) -> None:
+    def __init__(self, node: Node, asker: Asker, learned: Callable[[list[Parameter]], None]) -> None:
         """Begin without any.
 
         Args:
             node: Who asks.
+            asker: Calls the nodes' services.
             learned: Is told the parameters of each node that appears.
         """
-        self._node, self._learned = node, learned
-        self._asker = ParameterAsker(node, self._learn)
+        self._node, self._asker, self._learned = node, asker, learned
+        self._parameters = ParameterAsker(node, self._learn)
         self._values: dict[str, dict[str, Any]] = {}
         self._setters: dict[str, Client] = {}
 
     def look(self) -> None:
         """Look for nodes; call it about twice a second."""
-        self._asker.look()
+        self._parameters.look()
 
     def get(self, names: Iterable[str] = ()) -> list[Parameter]:
         """Return the parameters of those names, or all of them; unknown ones are left out. From any thread."""
@@ -70,7 +71,7 @@ class NodeSettings:
             value = float(value)  # JSON does not tell 1.0 from 1
         try:
             request = SetParameters.Request(parameters=[RosParameter(name, value=value).to_parameter_msg()])
-            [result] = ask(self._setters[node], request).results
+            [result] = self._asker.wait_for(self._setters[node], request).results
         except (NotServedError, TypeError, ValueError, AssertionError) as error:
             return str(error)
         if not result.successful:

@@ -10,6 +10,7 @@ from rclpy.client import Client
 from rclpy.node import Node
 
 from tulip_ros import schemas, topics
+from tulip_ros.asking import Asker
 from tulip_view.bridge.asking import ask_serialized
 from tulip_view.bridge.rules import DEFINITIONS, ENCODING, known_service
 
@@ -17,8 +18,8 @@ from tulip_view.bridge.rules import DEFINITIONS, ENCODING, known_service
 class Services:
     """Services of all robots in the graph."""
 
-    def __init__(self, node: Node, server: WebSocketServer) -> None:
-        self._node, self._server = node, server
+    def __init__(self, node: Node, asker: Asker, server: WebSocketServer) -> None:
+        self._node, self._asker, self._server = node, asker, server
         self._clients: dict[str, Client] = {}
         self._offered: set[str] = set()
 
@@ -46,8 +47,8 @@ class Services:
             for part, text in zip(("Request", "Response"), schemas.service_definitions(type_name), strict=True)
         )
         schema = ServiceSchema(type_name, request=request, response=response)
-        return Service(name, schema=schema, handler=partial(_answer, client))
+        return Service(name, schema=schema, handler=partial(_answer, self._asker, client))
 
 
-def _answer(client: Client, request: ServiceRequest) -> bytes:
-    return ask_serialized(client, request.payload)
+def _answer(asker: Asker, client: Client, request: ServiceRequest) -> bytes:
+    return ask_serialized(asker, client, request.payload)

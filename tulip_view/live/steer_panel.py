@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from html import escape
 
@@ -10,14 +9,12 @@ import viser
 
 from tulip_strategy.behaviour.tree import STRATEGIES
 from tulip_strategy.interface import UserRequest
-from tulip_strategy.menu import Wish
-from tulip_strategy.user_input import SIDES, UserInputParameters
+from tulip_strategy.user_input import SIDES, UserInputParameters, Wish
 from tulip_view.live.info_panel import STYLE
-from tulip_view.live.user_calls import UserCalls
+from tulip_view.outcome import PUSHES, Outcome
+from tulip_view.user_calls import UserCalls
 
 WIDTH = 270  # [px]
-PUSHES = {"forward": 0.0, "to the left": 90.0, "backward": 180.0, "to the right": -90.0}
-"""Directions as the robot sees them [deg]."""
 LIMP = "LIMP (emergency stop)"
 LIMP_WISH = Wish(UserRequest.LIMP)
 AS_IT_IS = "as it is"
@@ -82,15 +79,14 @@ class SteerPanel:
 
         @push.on_click
         def _(event: object) -> None:
-            angle = heading() + math.radians(PUSHES[direction.value])
-            calls().push((strength.value * math.cos(angle), strength.value * math.sin(angle), 0.0))
+            calls().push(direction.value, strength.value, heading())
 
         begin.on_click(lambda _: calls().record(True))
         end.on_click(lambda _: calls().record(False))
 
-    def tell(self, words: str) -> None:
+    def tell(self, outcome: Outcome) -> None:
         """Show what came of a wish."""
-        self._answer.content = STYLE.format(f"<b>{escape(words)}</b>")
+        self._answer.content = STYLE.format(f"<b>{escape(str(outcome))}</b>")
 
     def _on(self, button: viser.GuiButtonHandle, wish: Wish) -> None:
         button.on_click(lambda _: self._calls().wish(wish))

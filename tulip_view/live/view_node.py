@@ -10,6 +10,7 @@ from rclpy.node import Node
 
 from tulip_description.field import load_field
 from tulip_description.robot import load_robot
+from tulip_ros.asking import Asker
 from tulip_ros.run import ComponentNode, run
 from tulip_view.live.beside import PORT
 from tulip_view.live.live_feed import PICTURES, LiveFeed
@@ -17,9 +18,9 @@ from tulip_view.live.page import Page
 from tulip_view.live.scene import Scene
 from tulip_view.live.server import open_server
 from tulip_view.live.steer_panel import SteerPanel
-from tulip_view.live.user_calls import UserCalls
+from tulip_view.user_calls import UserCalls
 
-LOOK = 0.2  # [s] longest wait between two looks at what services have not answered
+LOOK = 0.2  # [s] longest wait between two looks at the page
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,7 @@ class ViewNode(ComponentNode):
         # What is polled must be on a node that no executor serves; both share one participant of the middleware.
         self._ears = Node("view_inputs", enable_rosout=False, start_parameter_services=False)
         self._feed = LiveFeed(self._ears, self._scene, (p.robot or self.get_namespace()).strip("/"))
+        self._asker = Asker(self)
         self._calls: dict[str, UserCalls] = {}
         self._calls_lock = threading.Lock()
         self._steer = SteerPanel(self._server, self._current_calls, self._heading)
@@ -79,8 +81,6 @@ class ViewNode(ComponentNode):
         spin(LOOK)
         self._page.check()
         self._current_calls()  # before a button is pressed: finding a service takes a moment
-        for calls in tuple(self._calls.values()):
-            calls.check()
 
     def destroy_node(self) -> None:
         """Close the page, and end."""
@@ -93,7 +93,7 @@ class ViewNode(ComponentNode):
         robot = self._feed.robot
         with self._calls_lock:
             if robot not in self._calls:
-                self._calls[robot] = UserCalls(self, robot, self._steer.tell)
+                self._calls[robot] = UserCalls(self, self._asker, robot, self._steer.tell)
             return self._calls[robot]
 
     def _heading(self) -> float:

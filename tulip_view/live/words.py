@@ -8,12 +8,11 @@ from html import escape
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from tulip_ros import topics
-from tulip_strategy.interface import UserRequest
 from tulip_strategy.messages import tree_from_message
 from tulip_strategy.tree_drawing import SIGNS
 from tulip_strategy.tree_state import NodeStatus
-from tulip_view.columns import PHASES, SECONDARY, SET_PLAYS, name_of
 from tulip_view.live.buffers import Buffers
+from tulip_view.state_words import doing_words, game_words, wish_words
 
 GREEN, YELLOW, RED, DIM = "#2b8a3e", "#b26b00", "#c92a2a", "#868e96"
 MARKS = {
@@ -28,7 +27,6 @@ LEVELS = {
     DiagnosticStatus.ERROR: ("error", RED),
     DiagnosticStatus.STALE: ("stale", RED),
 }
-REQUESTS = {request.value: request.name.lower().replace("_", " ") for request in UserRequest}
 SILENT = 3.0  # [s] without diagnostics, which come each second
 RATE = "rate "
 FIGURES = ("latency", "processor", "restarts")
@@ -38,25 +36,14 @@ FIGURES = ("latency", "processor", "restarts")
 def game(buffers: Buffers) -> str:
     """Return the game and the user's wish in a few lines."""
     lines = []
-    message = buffers.newest(topics.USER_COMMAND)
-    if message is not None:
-        what = name_of(REQUESTS, message.request)
-        what += f" {message.strategy}" if message.request == UserRequest.PLAY else ""
-        lines.append(f"user: <b>{escape(what)}</b>")
-    state = buffers.newest(topics.GAME_STATE)
-    if state is not None:
-        extras = [name_of(SECONDARY, state.secondary_state)] if state.secondary_state else []
-        extras += [name_of(SET_PLAYS, state.set_play)] if state.set_play else []
-        extras += [f"penalty {state.penalty}"] if state.penalty else []
-        extras += ["stopped"] if state.stopped else []
-        extras += ["<b>stale</b>"] if state.stale else []
-        lines.append(
-            f"game: <b>{name_of(PHASES, state.phase)}</b>, {state.own_score} : {state.opponent_score},"
-            f" {state.seconds_remaining} s left" + "".join(f", {each.replace('_', ' ')}" for each in extras)
-        )
-    decision = buffers.newest(topics.DECISION)
-    if decision is not None:
-        lines.append(f"doing: <b>{escape(decision.tree.rsplit(' > ', 1)[-1])}</b>")
+    for title, topic, words in (
+        ("user", topics.USER_COMMAND, wish_words),
+        ("game", topics.GAME_STATE, game_words),
+        ("doing", topics.DECISION, doing_words),
+    ):
+        message = buffers.newest(topic)
+        if message is not None:
+            lines.append(f"{title}: <b>{escape(words(message))}</b>")
     return "<br>".join(lines) or "no game"
 
 
