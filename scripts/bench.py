@@ -7,7 +7,8 @@ import sys
 import _environment
 
 if __name__ == "__main__":
-    _environment.prepare(("bench",) if {"clik", "log", "vision"} & set(sys.argv) else ())  # what these compare with
+    extras = ("bench",) if {"clik", "log", "vision"} & set(sys.argv) else ()  # what these compare with
+    _environment.prepare(("view", "bridge") if "faces" in sys.argv else extras)
 
 import json
 from pathlib import Path
@@ -26,6 +27,7 @@ from tulip_sim.bench import (
     clik,
     control,
     dynamics,
+    faces,
     head,
     identify,
     ilc,
@@ -47,7 +49,7 @@ from tulip_sim.bench.runner import Row, run, save, write_results
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress),
-    *(simcheck, vision, localization, ball, head, latency, log, identify, dynamics),
+    *(simcheck, vision, localization, ball, head, latency, log, faces, identify, dynamics),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"
