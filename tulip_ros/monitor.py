@@ -13,7 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from tulip_ros import topics
-from tulip_ros.aggregation import NOT_HEARD, Aggregation, Report
+from tulip_ros.aggregation import NOT_HEARD, Aggregation, Report, by_topic
 from tulip_ros.finding import Level
 from tulip_ros.launch import ProcessState
 from tulip_ros.nodes import DRIVER, ROBOT
@@ -75,20 +75,23 @@ class Monitor:
         whole, reports = self.summary(), self.reports()
         style = STYLES[_word(whole)]
         table = Table(box=None, pad_edge=False, title=f"[{style}]{escape(whole.words)}[/]", title_justify="left")
-        for column in ("node", "process", "restarts", "health", "processor", "fastest input [1/s]", "says"):
-            table.add_column(column)
+        for column in ("node", "process", "restarts", "health", "processor", "fastest [1/s]", "slowest [ms]", "says"):
+            table.add_column(escape(column))
         for state in states:
             report = reports.get(state.name, Report(Level.OK, NOT_HEARD)) if state.state == "running" else None
             word = state.state if report is None else _word(report)
-            rates = {} if report is None else input_rates(report)
+            values = {} if report is None else report.values
+            rates, latencies = by_topic(values, "rate"), by_topic(values, "latency")
             fastest = max(rates, key=lambda topic: rates[topic], default="")
+            slowest = max(latencies, key=lambda topic: latencies[topic], default="")
             table.add_row(
                 state.name,
                 str(state.pid or "-"),
                 str(state.restarts),
                 f"[{STYLES.get(word, 'red')}]{word}[/]",
-                "" if report is None else f"{report.values.get('processor [%]', '-')} %",
+                "" if report is None else f"{values.get('processor [%]', '-')} %",
                 f"{rates[fastest]:.0f} {fastest}" if fastest else "-",
+                f"{latencies[slowest]:.1f} {slowest}" if slowest else "-",
                 "" if report is None else escape(report.words),
             )
         return table
@@ -97,15 +100,6 @@ class Monitor:
 def report_from_status(status: DiagnosticStatus) -> Report:
     """Return what a node says about itself."""
     return Report(Level(status.level[0]), status.message, {pair.key: pair.value for pair in status.values})
-
-
-def input_rates(report: Report) -> dict[str, float]:
-    """Return how many messages [1/s] a node takes in, by topic."""
-    return {
-        key.removeprefix("rate ").removesuffix(" [1/s]"): float(value)
-        for key, value in report.values.items()
-        if key.startswith("rate ")
-    }
 
 
 def _word(report: Report) -> str:
