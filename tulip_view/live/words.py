@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -30,7 +31,6 @@ LEVELS = {
 }
 REQUESTS = {request.value: request.name.lower().replace("_", " ") for request in UserRequest}
 SILENT = 3.0  # [s] without diagnostics, which come each second
-RIGHT = "vertical-align:top;text-align:right"
 
 
 def game(buffers: Buffers) -> str:
@@ -89,7 +89,7 @@ def health(buffers: Buffers) -> str:
     if not buffers.health:
         return "no diagnostics"
     columns = ("node", "", "rate [1/s]", "latency [ms]", "processor [%]", "restarts")
-    rows = ["".join(f'<th style="{RIGHT}">{name.replace(" ", "<br>")}</th>' for name in columns)]
+    rows = [_row("th", [name.replace(" ", "<br>") for name in columns])]
     for name, (when, status) in sorted(buffers.health.items()):
         words, colour = LEVELS.get(status.level, ("unknown", RED))
         if buffers.now - when > SILENT:
@@ -98,11 +98,20 @@ def health(buffers: Buffers) -> str:
         cells = [escape(name), f'<b style="color:{colour}">{words}</b>']
         cells += [_greatest(by_topic(values, "rate"), "{:.0f}"), _greatest(by_topic(values, "latency"), "{:.1f}")]
         cells += [escape(values.get(key, "")) for key in ("processor [%]", "restarts")]
-        rows.append("".join(f'<td style="{RIGHT}">{cell}</td>' for cell in cells))
+        rows.append(_row("td", cells))
         if status.message != "running":
             rows.append(f'<td colspan="{len(columns)}" style="color:{colour}">{escape(status.message)}</td>')
     lines = "".join(f"<tr>{row}</tr>" for row in rows)
     return f'<table style="border-spacing:0.6em 0.1em">{lines}</table>'
+
+
+def _row(tag: str, cells: Sequence[str]) -> str:
+    """Return the cells of a row: words to the left, figures to the right."""
+    sides = ("left", "left", *("right" for _ in cells[2:]))
+    return "".join(
+        f'<{tag} style="vertical-align:top;text-align:{side}">{cell}</{tag}>'
+        for side, cell in zip(sides, cells, strict=True)
+    )
 
 
 def _greatest(figures: dict[str, float], form: str) -> str:
