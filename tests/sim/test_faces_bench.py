@@ -12,7 +12,7 @@ from tulip_sim.bench import faces
 from tulip_sim.bench.faces_lookers.looker import PAGE, Looker
 from tulip_sim.bench.faces_lookers.terminal import Terminal
 from tulip_sim.bench.free_port import free_port
-from tulip_sim.bench.processor_time import processor_time
+from tulip_sim.bench.processor_time import family_time, processor_time
 
 PATIENCE = 60.0  # [s]
 
@@ -30,7 +30,7 @@ def test_medians_are_told_of_each_way_and_ratios_of_the_same_round() -> None:
         row = {"round": number}
         for way, factor in ((faces.WITHOUT, without), (faces.PROGRAM, with_faces)):
             row |= {f"{way}: {faces.FACTOR}": factor, f"{way}: {faces.ROBOT}": 1.2}
-        shares = {"view": 0.1 * number, "bridge": 0.05, "menu": 0.01}
+        shares = {"view": 0.1 * number, "bridge": 0.05, "menu": 0.01, "page": 0.2, "viewer": 0.3}
         rows.append(row | {f"{faces.PROGRAM}: {name} [core]": share for name, share in shares.items()})
     table = [line for line in faces.summarize(rows) if line.startswith("|")]
     assert len(table) == 4  # head, and the ways that were played
@@ -38,12 +38,20 @@ def test_medians_are_told_of_each_way_and_ratios_of_the_same_round() -> None:
     assert cells[2] == "0.90 (0.50 to 1.10)"
     assert cells[3] == "1.00 (0.90 to 1.10)"
     assert cells[7] == "0.26 (0.16 to 0.36)"  # together, in each round
+    assert cells[9] == "0.50 (0.50 to 0.50)"
 
 
 def test_a_busy_process_has_computed_and_a_sleeping_one_has_not() -> None:
     with Terminal([sys.executable, "-c", "while True: pass"]) as busy, Terminal(["sleep", "60"]) as idle:
         until(lambda: processor_time(busy.pid) > 0.1)
         assert processor_time(idle.pid) < 0.1
+
+
+def test_what_a_program_has_started_counts_with_it() -> None:
+    program = "import subprocess, sys; subprocess.run([sys.executable, '-c', 'while True: pass'])"
+    with Terminal([sys.executable, "-c", program]) as parent:
+        until(lambda: family_time(parent.pid) > 0.5)
+        assert processor_time(parent.pid) < 0.25
 
 
 def test_a_program_in_a_terminal_draws_and_its_end_is_told_with_its_last_words() -> None:
@@ -89,7 +97,7 @@ def test_a_program_that_looks_and_cannot_go_on_is_told_of() -> None:
             try:
                 looker.sees()
             except RuntimeError as error:
-                return "looks by the page has ended" in str(error)
+                return "looks (page) has ended" in str(error)
             return False
 
         until(told)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from socket import SOCK_STREAM
@@ -23,7 +23,7 @@ from tulip_sim.bench.faces_lookers import browser
 from tulip_sim.bench.faces_lookers.looker import BRIDGE, BROWSER, PAGE, Looker
 from tulip_sim.bench.faces_lookers.terminal import Terminal
 from tulip_sim.bench.free_port import free_port, own_domain
-from tulip_sim.bench.processor_time import processor_time
+from tulip_sim.bench.processor_time import family_time
 from tulip_sim.bench.runner import Bench, Row
 from tulip_sim.match_graph import SILENCE, TrialWatcher, trial_plan
 
@@ -37,6 +37,8 @@ WAYS = {
     PROGRAM: "with; a program takes what the page sends",
     CHROMIUM: "with; Chromium draws the page, without a graphics card",
 }
+LOOKING = {PROGRAM: PAGE, CHROMIUM: BROWSER}
+"""Who looks by the page in each way."""
 MENU = Path(__file__).parents[2] / "scripts" / "menu.py"
 FACTOR, ROBOT, PLAYED = "real-time factor", "robot and simulator [core]", "played [s]"
 
@@ -73,8 +75,7 @@ def play(seed: int, way: str) -> Row:
             ports = {"view": free_port(SOCK_STREAM), "bridge": free_port(SOCK_STREAM)}
             values = {name: {"port": port} for name, port in ports.items()}
             processes.append(stack.enter_context(Launcher(make_plan(list(ports), values=values, driver=None))))
-            page = PAGE if way == PROGRAM else BROWSER
-            for kind, face in ((page, "view"), (BRIDGE, "bridge")):
+            for kind, face in ((LOOKING[way], "view"), (BRIDGE, "bridge")):
                 lookers.append(stack.enter_context(Looker(kind, ports[face])))
         processes.append(stack.enter_context(Launcher(trial_plan(seed, referee_port=free_port()))))
         watcher, spin = stack.enter_context(session(TrialWatcher, arguments=[], handle_signals=False))
@@ -93,16 +94,19 @@ def play(seed: int, way: str) -> Row:
         if way != WITHOUT:
             menu = stack.enter_context(Terminal([sys.executable, str(MENU)]))
         wait(lambda: _played(watcher) > BEGIN and all(looker.sees() for looker in lookers))
-        pids = {state.name: state.pid for launcher in processes for state in launcher.states()}
-        if menu is not None:
-            pids["menu"] = menu.pid
+        nodes = {state.name: state.pid for launcher in processes for state in launcher.states()}
+        pids = (
+            nodes | {looker.kind: looker.pid for looker in lookers} | ({"menu": menu.pid} if menu is not None else {})
+        )
         first, begun, before = watcher.stamp, time.monotonic(), _times(pids)
         wait(lambda: watcher.stamp - first > WATCHED * 1e9 or _is_over(watcher))
         spent, elapsed = {name: after - before[name] for name, after in _times(pids).items()}, time.monotonic() - begun
         played = (watcher.stamp - first) * 1e-9
         row: Row = {FACTOR: round(played / elapsed, 3), PLAYED: round(played, 1)}
-        row[ROBOT] = round(sum(spent[name] for name in pids if name not in FACES) / elapsed, 4)
-        row |= {f"{name} [core]": round(spent[name] / elapsed, 4) for name in FACES if name in pids}
+        row[ROBOT] = round(sum(spent[name] for name in nodes if name not in FACES) / elapsed, 4)
+        row |= {
+            f"{name} [core]": round(spent[name] / elapsed, 4) for name in pids if name not in nodes or name in FACES
+        }
         for looker in lookers:
             row |= looker.end()
         return row
@@ -117,7 +121,7 @@ def _is_over(watcher: TrialWatcher) -> bool:
 
 
 def _times(pids: Mapping[str, int]) -> dict[str, float]:
-    return {name: processor_time(pid) for name, pid in pids.items()}
+    return {name: family_time(pid) for name, pid in pids.items()}
 
 
 def summarize(rows: list[Row]) -> list[str]:
@@ -128,11 +132,13 @@ def summarize(rows: list[Row]) -> list[str]:
         " page is open in a browser, or in a program that takes all that it sends and answers at once, as the browser"
         " of a fast machine does; a viewer listens to every topic of the bridge, raw pictures included; the menu is in"
         f" a terminal. Asked for: the three together {SHARE:.0%} of a core at most, and no match slowed. Browser,"
-        " viewer and terminal are not counted, but take their part of the same cores. `robot and simulator` tells what"
-        " the faces have the other nodes do: those compress and send pictures only while someone listens.",
+        " viewer and terminal are not counted, but take their part of the same cores (`who looks`: browser or program,"
+        " and viewer). `robot and simulator` tells what the faces have the other nodes do: those compress and send"
+        " pictures only while someone listens. All but the factors in cores.",
         "",
-        "| way | real-time factor | of that without | view | bridge | menu | together | robot and simulator |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| way | real-time factor | of that without | view | bridge | menu | together | robot and simulator"
+        " | who looks |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for way, words in WAYS.items():
         of_way = [row for row in rows if f"{way}: {FACTOR}" in row]
@@ -142,15 +148,18 @@ def summarize(rows: list[Row]) -> list[str]:
         def figures(name: str, way: str = way, of_way: list[Row] = of_way) -> np.ndarray:
             return np.array([row[f"{way}: {name}"] for row in of_way])
 
+        def together(names: Sequence[str], figures: Callable[[str], np.ndarray] = figures) -> str:
+            return _told(np.sum([figures(f"{name} [core]") for name in names], axis=0))
+
         factors = figures(FACTOR)
         ratios = factors / np.array([row[f"{WITHOUT}: {FACTOR}"] for row in of_way])
         cells = [words, _told(factors), "" if way == WITHOUT else _told(ratios)]
         if way == WITHOUT:
-            cells += [""] * 4
+            cells += ["", "", "", "", _told(figures(ROBOT)), ""]
         else:
-            shares = [figures(f"{name} [core]") for name in FACES]
-            cells += [_told(each) for each in (*shares, np.sum(shares, axis=0))]
-        lines.append(f"| {' | '.join([*cells, _told(figures(ROBOT))])} |")
+            cells += [together([name]) for name in FACES]
+            cells += [together(FACES), _told(figures(ROBOT)), together((LOOKING[way], BRIDGE))]
+        lines.append(f"| {' | '.join(cells)} |")
     return lines
 
 

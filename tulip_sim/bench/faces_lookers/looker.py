@@ -17,8 +17,8 @@ from types import TracebackType
 PATIENCE = 60.0  # [s] until the other side is there
 PAUSE = 0.2  # [s] between two attempts
 READY = "sees something"
-PAGE, BRIDGE, BROWSER = "page", "bridge", "browser"
-"""Modules beside this one."""
+PAGE, BRIDGE, BROWSER = "page", "viewer", "browser"
+"""Modules beside this one: by the page, by the bridge, by the page in a browser."""
 
 
 class Looker:
@@ -31,7 +31,7 @@ class Looker:
             kind: `PAGE`, `BRIDGE` or `BROWSER`.
             port: TCP port of the face.
         """
-        self._kind = kind
+        self.kind = kind
         command = [sys.executable, "-m", f"{__package__}.{kind}", str(port)]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self._ready = threading.Event()
@@ -48,6 +48,11 @@ class Looker:
         self._process.kill()
         self._process.wait()
 
+    @property
+    def pid(self) -> int:
+        """Id of its process."""
+        return self._process.pid
+
     def sees(self) -> bool:
         """Return whether it has seen something.
 
@@ -55,7 +60,7 @@ class Looker:
             RuntimeError: if it has ended.
         """
         if self._process.poll() is not None:
-            raise RuntimeError(f"the program that looks by the {self._kind} has ended; its error stands above")
+            raise RuntimeError(f"the program that looks ({self.kind}) has ended; its error stands above")
         return self._ready.is_set()
 
     def end(self) -> dict[str, float]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import termios
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from types import TracebackType
 
 SIZE = (40, 120)  # rows and columns
@@ -41,7 +43,8 @@ class Terminal:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._process.kill()
+        with suppress(ProcessLookupError):  # it has ended by itself
+            os.killpg(self._process.pid, signal.SIGKILL)  # and what it has started
         self._process.wait()
         self._reader.join()
         os.close(self._own)
