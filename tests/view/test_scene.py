@@ -32,7 +32,7 @@ from tulip_view.live.curves import error_curves, joint_curves
 from tulip_view.live.inputs import INPUTS, WINDOW, not_shown
 from tulip_view.live.intake import Intake
 from tulip_view.live.log_feed import LogFeed
-from tulip_view.live.pace import FASTEST, SLOWEST, Pace
+from tulip_view.live.pace import BROWSER_SHARE, FASTEST, SLOWEST, Pace
 from tulip_view.live.scene import Scene
 from tulip_view.live.shapes import CORNERS, FACES
 from tulip_view.live.words import SILENT
@@ -341,6 +341,11 @@ def test_the_pace_follows_a_slow_browser_down_and_up_again():
     for _ in range(20):
         pace.answered(0.02)
     assert pace.period == pytest.approx(1.0 / FASTEST)
+    pace.answered(0.1)
+    pace.answered(0.02)  # this question came between two pictures
+    assert 0.1 / pace.period == pytest.approx(BROWSER_SHARE)
+    for _ in range(20):
+        pace.answered(0.02)
     for _ in range(100):
         pace.worked(0.05)
     assert pace.period == pytest.approx(0.2, rel=0.01)  # a quarter of the time at most
