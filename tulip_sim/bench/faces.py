@@ -93,20 +93,20 @@ def play(seed: int, way: str) -> Row:
         wait(lambda: watcher.truth is not None)  # so the robot's nodes are there, which the menu wants
         if way != WITHOUT:
             menu = stack.enter_context(Terminal([sys.executable, str(MENU)]))
-        wait(lambda: _played(watcher) > BEGIN and all(looker.sees() for looker in lookers))
+        wait(lambda: all(looker.sees() for looker in lookers) and (menu is None or menu.drawn > 0))
+        wait(lambda: _played(watcher) > BEGIN)
         nodes = {state.name: state.pid for launcher in processes for state in launcher.states()}
-        pids = (
-            nodes | {looker.kind: looker.pid for looker in lookers} | ({"menu": menu.pid} if menu is not None else {})
-        )
+        others = {looker.kind: looker.pid for looker in lookers}
+        if menu is not None:
+            others["menu"] = menu.pid
+        pids = nodes | others
         first, begun, before = watcher.stamp, time.monotonic(), _times(pids)
         wait(lambda: watcher.stamp - first > WATCHED * 1e9 or _is_over(watcher))
         spent, elapsed = {name: after - before[name] for name, after in _times(pids).items()}, time.monotonic() - begun
         played = (watcher.stamp - first) * 1e-9
         row: Row = {FACTOR: round(played / elapsed, 3), PLAYED: round(played, 1)}
         row[ROBOT] = round(sum(spent[name] for name in nodes if name not in FACES) / elapsed, 4)
-        row |= {
-            f"{name} [core]": round(spent[name] / elapsed, 4) for name in pids if name not in nodes or name in FACES
-        }
+        row |= {f"{name} [core]": round(spent[name] / elapsed, 4) for name in pids if name in FACES or name in others}
         for looker in lookers:
             row |= looker.end()
         return row
