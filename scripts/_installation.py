@@ -13,7 +13,7 @@ import socket
 import subprocess
 import sys
 from pathlib import Path
-from typing import Callable, Iterator, Mapping, NamedTuple  # noqa: UP035
+from typing import Callable, Iterator, Mapping, NamedTuple, Sequence, Tuple  # noqa: UP035
 
 import _environment
 
@@ -32,8 +32,33 @@ HIGHEST_DOMAIN, SAFE_DOMAINS = 232, range(102)
 """Above 101 the ports collide with those that Linux gives out by itself."""
 RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 EXECUTORS = ("events", "single")
-PORTS = {3838: "packets of the referee (node game_input)"}
-"""UDP ports that a robot listens on."""
+
+
+class Port(NamedTuple):
+    """A port that a program of this project listens on.
+
+    Attributes:
+        kind: "UDP" or "TCP".
+        number: Its number.
+        purpose: What for.
+        holders: Of which one is in the command line of that program.
+        other: How to have it listen on another port.
+    """
+
+    kind: str
+    number: int
+    purpose: str
+    holders: Tuple[str, ...]  # noqa: UP006
+    other: str
+
+
+PORTS = (
+    Port("UDP", 3838, "packets of the referee", ("game_input_node",), "set the parameter port of game_input"),
+    Port("TCP", 8080, "the page (view)", ("live.view_node", "scripts/view.py"), "choose another with --port"),
+    Port("TCP", 8765, "the bridge for Foxglove", ("bridge_node", "scripts/bridge.py"), "choose another with --port"),
+)
+SOCKETS = {"UDP": (socket.SOCK_DGRAM, "/proc/net/udp", ""), "TCP": (socket.SOCK_STREAM, "/proc/net/tcp", "0A")}
+"""Of each kind its type, where Linux lists them, and the state in which one listens."""
 
 
 class Found(NamedTuple):
@@ -255,26 +280,25 @@ def _disturbing(values: Mapping[str, str]) -> Iterator[Found]:
         yield Found(ERROR, part, f"TULIP_EXECUTOR is {executor}; expected {' or '.join(EXECUTORS)}")
 
 
-def ports(wanted: Mapping[int, str] | None = None) -> Iterator[Found]:
-    """Check that the ports that a robot listens on are free, or held by a robot."""
-    for port, purpose in (PORTS if wanted is None else wanted).items():
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+def ports(wanted: Sequence[Port] = PORTS) -> Iterator[Found]:
+    """Check that the ports that the programs listen on are free, or held by them."""
+    for port in wanted:
+        part = f"{port.kind} port {port.number}"
+        with socket.socket(socket.AF_INET, SOCKETS[port.kind][0]) as probe:
+            if port.kind == "TCP":  # a connection that has ended a moment ago does not keep a server from it
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
-                probe.bind(("127.0.0.1", port))
-                yield Found(OK, f"UDP port {port}", f"free for {purpose}")
+                probe.bind(("127.0.0.1", port.number))
+                yield Found(OK, part, f"free for {port.purpose}")
                 continue
             except OSError:
                 pass
         holder = _holder(port)
-        if "game_input_node" in holder:
-            yield Found(OK, f"UDP port {port}", f"held by a running robot, for {purpose}")
+        if any(words in holder for words in port.holders):
+            yield Found(OK, part, f"held by a running program of this project, for {port.purpose}")
         else:
             who = f"by `{holder}`" if holder else "by another user's program"
-            yield Found(
-                WARNING,
-                f"UDP port {port}",
-                f"taken {who}, wanted for {purpose}: end that program, or set the parameter port of game_input",
-            )
+            yield Found(WARNING, part, f"taken {who}, wanted for {port.purpose}: end that program, or {port.other}")
 
 
 def optional() -> Iterator[Found]:
@@ -286,12 +310,13 @@ def optional() -> Iterator[Found]:
         yield Found(OK, "browser", "none here: open the pages in a browser of another machine; their tests are skipped")
 
 
-def _holder(port: int) -> str:
-    """Return the command line of the own process that holds a UDP port of this machine, or ""."""
+def _holder(port: Port) -> str:
+    """Return the command line of the own process that holds a port of this machine, or ""."""
+    _, table, listens = SOCKETS[port.kind]
     inodes = set()
-    for line in _read(Path("/proc/net/udp")).splitlines()[1:]:
+    for line in _read(Path(table)).splitlines()[1:]:
         fields = line.split()
-        if len(fields) > 9 and int(fields[1].rpartition(":")[2], 16) == port:
+        if len(fields) > 9 and int(fields[1].rpartition(":")[2], 16) == port.number and listens in ("", fields[3]):
             inodes.add(f"socket:[{fields[9]}]")
     for process in Path("/proc").glob("[0-9]*"):
         try:

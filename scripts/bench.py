@@ -7,8 +7,9 @@ import sys
 import _environment
 
 if __name__ == "__main__":
-    compared = ("bench",) if {"clik", "log", "vision"} & set(sys.argv) else ()  # what these compare with
-    _environment.prepare((*compared, "mujoco") if "engines" in sys.argv else compared)
+    extras = ("bench",) if {"clik", "log", "vision"} & set(sys.argv) else ()  # what these compare with
+    extras += ("view", "bridge") if "faces" in sys.argv else ()
+    _environment.prepare((*extras, "mujoco") if "engines" in sys.argv else extras)
 
 import json
 from pathlib import Path
@@ -28,6 +29,7 @@ from tulip_sim.bench import (
     control,
     dynamics,
     engines,
+    faces,
     head,
     identify,
     ilc,
@@ -49,7 +51,7 @@ from tulip_sim.bench.runner import Row, run, save, write_results
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress, engines),
-    *(simcheck, vision, localization, ball, head, latency, log, identify, dynamics),
+    *(simcheck, vision, localization, ball, head, latency, log, faces, identify, dynamics),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"

@@ -84,8 +84,7 @@ def keep_running(launcher: Launcher, namespace: str) -> None:
         ):
             names = [state.name for state in launcher.states()]
             # Who starts tools beside a running robot leaves the sum to the one who started the robot.
-            publishes = bool({DRIVER, *ROBOT} & set(names)) and AGGREGATOR not in names
-            monitor = Monitor(node, names, publishes=publishes, states=launcher.states)
+            monitor = Monitor(node, names, publishes=bool({DRIVER, *ROBOT} & set(names)) and AGGREGATOR not in names)
             while True:
                 spin(LOOK)
                 for line in launcher.poll():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -10,6 +12,24 @@ from tulip_ros.finding import Level
 STALE_AFTER = 3.0  # [s] of wall-clock time without a report, of which one comes each second
 STARTING = 10.0  # [s] of wall-clock time in which an expected node may still start
 NOT_HEARD = "starting"
+
+
+def by_topic(values: Mapping[str, str], kind: str) -> dict[str, float]:
+    """Return a node's figures of its inputs, by topic; NaN for what is no number.
+
+    Args:
+        values: The figures of its report.
+        kind: "rate" [1/s], or "latency" [ms].
+    """
+    keys = {key.split()[1]: value for key, value in values.items() if re.fullmatch(rf"{kind} \S+ \[\S+\]", key)}
+    return {topic: _number(value) for topic, value in keys.items()}
+
+
+def _number(words: str) -> float:
+    try:
+        return float(words)
+    except ValueError:
+        return math.nan
 
 
 @dataclass(frozen=True)

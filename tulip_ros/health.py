@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Callable
 from functools import cache
@@ -14,6 +15,7 @@ from rclpy.node import Node
 
 from tulip_ros import topics
 from tulip_ros.finding import Finding, Level, say, worst
+from tulip_ros.launch import RESTARTS_VARIABLE
 from tulip_ros.time import to_message
 from tulip_ros.topics import Topic
 from tulip_ros.watches import HOLD, InputWatch, TimeWatch
@@ -118,8 +120,12 @@ class Health:
             for name, watch in sorted(self._inputs.items())
         }
         self._shown = {name: watch.count for name, watch in self._inputs.items()}
+        latencies = {name: watch.latency() for name, watch in sorted(self._inputs.items())}
+        values |= {f"latency {name} [ms]": f"{1e3 * mean:.1f}" for name, mean in latencies.items() if mean is not None}
         values |= {event: str(count) for event, count in sorted(self._events.items())}
         values |= self._figures | {"processor [%]": f"{100.0 * busy / elapsed:.1f}", "version": version()}
+        if RESTARTS_VARIABLE in os.environ:
+            values["restarts"] = os.environ[RESTARTS_VARIABLE]
         if self._time.jumps:
             values["jumps of the clock"] = str(self._time.jumps)
         status = DiagnosticStatus(

@@ -22,6 +22,8 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.2, 10.0  # [s] before a restart; doubles with eac
 SETTLED = 20.0  # [s] of life after which earlier deaths are forgotten
 DEATHS = 6  # in a row, after which a node is given up
 PATIENCE = 5.0  # [s] to end by itself after SIGTERM, before SIGKILL
+RESTARTS_VARIABLE = "TULIP_RESTARTS"
+"""Environment variable that tells a node how many times it was started again."""
 DIES_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl(2)
 TAIL = 15  # lines of a dead node's log in messages
 
@@ -139,7 +141,12 @@ class _Process:
         with open(self._log, "ab") as log:
             self._process = subprocess.Popen(
                 self._command,
-                env={"ROS_LOG_DIR": str(self._log.parent), **os.environ, "PYTHONUNBUFFERED": "1"},
+                env={
+                    "ROS_LOG_DIR": str(self._log.parent),
+                    **os.environ,
+                    "PYTHONUNBUFFERED": "1",
+                    RESTARTS_VARIABLE: str(self._starts),
+                },
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,

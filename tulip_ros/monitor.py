@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from functools import partial
 from time import monotonic
 
@@ -14,14 +13,12 @@ from rich.markup import escape
 from rich.table import Table
 
 from tulip_ros import topics
-from tulip_ros.aggregation import NOT_HEARD, Aggregation, Report
+from tulip_ros.aggregation import NOT_HEARD, Aggregation, Report, by_topic
 from tulip_ros.finding import Level
 from tulip_ros.launch import ProcessState
 from tulip_ros.nodes import DRIVER, ROBOT
 
 PERIOD = 1.0  # [s] of wall-clock time between two sums, as between two reports of a node
-RESTARTS = "restarts"
-"""Name of the figure that tells how many times a node was started again."""
 STYLES = {"ok": "green", "warning": "yellow", "error": "red", "stale": "red", "starting": "dim"}
 
 
@@ -33,12 +30,7 @@ class Monitor:
     """
 
     def __init__(
-        self,
-        node: Node,
-        expected: Sequence[str] = (),
-        namespaces: Sequence[str] = ("",),
-        publishes: bool = True,
-        states: Callable[[], Sequence[ProcessState]] = tuple,
+        self, node: Node, expected: Sequence[str] = (), namespaces: Sequence[str] = ("",), publishes: bool = True
     ) -> None:
         """Connect.
 
@@ -47,9 +39,8 @@ class Monitor:
             expected: Names of nodes that should be there, as in "motion" or, of several robots, "striker/motion".
             namespaces: Of the robots, below the node's own.
             publishes: False where another one publishes the sum.
-            states: Returns how the processes are, where this program started them: the sum tells their restarts.
         """
-        self._node, self._states = node, states
+        self._node = node
         self._aggregation = Aggregation((DRIVER, *ROBOT), expected, monotonic())
         for namespace in namespaces:
             topics.DIAGNOSTICS.within(namespace).subscribe_from(node, partial(self._on_diagnostics, namespace))
@@ -66,10 +57,7 @@ class Monitor:
         now = monotonic()
         root = self._node.get_namespace().rstrip("/") or "/robot"
         statuses = [_status(root, self._aggregation.summary(now))]
-        restarts = {state.name: {RESTARTS: str(state.restarts)} for state in self._states()}
-        for name, report in self._aggregation.reports(now).items():
-            values = {**report.values, **restarts.get(name, {})}
-            statuses.append(_status(f"{root}/{name}", replace(report, values=values)))
+        statuses += [_status(f"{root}/{name}", report) for name, report in self._aggregation.reports(now).items()]
         message = DiagnosticArray(status=statuses)
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._sender.publish(message)
@@ -87,20 +75,23 @@ class Monitor:
         whole, reports = self.summary(), self.reports()
         style = STYLES[_word(whole)]
         table = Table(box=None, pad_edge=False, title=f"[{style}]{escape(whole.words)}[/]", title_justify="left")
-        for column in ("node", "process", "restarts", "health", "processor", "fastest input [1/s]", "says"):
-            table.add_column(column)
+        for column in ("node", "process", "restarts", "health", "processor", "fastest [1/s]", "slowest [ms]", "says"):
+            table.add_column(escape(column))
         for state in states:
             report = reports.get(state.name, Report(Level.OK, NOT_HEARD)) if state.state == "running" else None
             word = state.state if report is None else _word(report)
-            rates = {} if report is None else input_rates(report)
+            values = {} if report is None else report.values
+            rates, latencies = by_topic(values, "rate"), by_topic(values, "latency")
             fastest = max(rates, key=lambda topic: rates[topic], default="")
+            slowest = max(latencies, key=lambda topic: latencies[topic], default="")
             table.add_row(
                 state.name,
                 str(state.pid or "-"),
                 str(state.restarts),
                 f"[{STYLES.get(word, 'red')}]{word}[/]",
-                "" if report is None else f"{report.values.get('processor [%]', '-')} %",
+                "" if report is None else f"{values.get('processor [%]', '-')} %",
                 f"{rates[fastest]:.0f} {fastest}" if fastest else "-",
+                f"{latencies[slowest]:.1f} {slowest}" if slowest else "-",
                 "" if report is None else escape(report.words),
             )
         return table
@@ -109,15 +100,6 @@ class Monitor:
 def report_from_status(status: DiagnosticStatus) -> Report:
     """Return what a node says about itself."""
     return Report(Level(status.level[0]), status.message, {pair.key: pair.value for pair in status.values})
-
-
-def input_rates(report: Report) -> dict[str, float]:
-    """Return how many messages [1/s] a node takes in, by topic."""
-    return {
-        key.removeprefix("rate ").removesuffix(" [1/s]"): float(value)
-        for key, value in report.values.items()
-        if key.startswith("rate ")
-    }
 
 
 def _word(report: Report) -> str:

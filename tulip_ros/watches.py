@@ -36,12 +36,23 @@ class InputWatch:
         """Messages that came so far."""
         self.stamp = 0
         """Stamp of the newest of them [ns]; 0 where they carry none."""
+        self._served = (0.0, 0)  # sum [s] and number since they were last told
         self._name, self._senders = name, " or ".join(senders)
         self._rate, self._missed_after = rate, missed_after
         self._begun = now
         self._seen = 0
         self._since = (now, 0)  # wall clock [s] and graph's time [ns] of the last look that saw a new message
         self._before = (0, 0)  # count and stamp at the last tally
+
+    def served(self, duration: float) -> None:
+        """Take how long the node took over a message, with all that it sent for it [s]."""
+        total, number = self._served
+        self._served = (total + duration, number + 1)
+
+    def latency(self) -> float | None:
+        """Return the mean of what `served` was told since the last call [s]; None if nothing came."""
+        (total, number), self._served = self._served, (0.0, 0)
+        return total / number if number else None
 
     def begin_anew(self) -> None:
         """Forget stamps: time began anew."""

@@ -16,6 +16,9 @@ import pytest
 from _installation import ERROR, OK, WARNING, Found
 
 from tulip_ros import run, transport
+from tulip_strategy import game_controller
+from tulip_view.bridge import settings
+from tulip_view.live import beside
 
 
 def levels(found: list[Found]) -> set[str]:
@@ -53,14 +56,29 @@ def test_the_executors_named_are_those_that_there_are() -> None:
     assert set(installation.EXECUTORS) == set(run.EXECUTORS)
 
 
-def test_a_taken_port_is_named_with_the_program_that_holds_it() -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+@pytest.mark.parametrize(("kind", "socket_kind"), [("UDP", socket.SOCK_DGRAM), ("TCP", socket.SOCK_STREAM)])
+def test_a_taken_port_is_named_with_the_program_that_holds_it(kind: str, socket_kind: socket.SocketKind) -> None:
+    with socket.socket(socket.AF_INET, socket_kind) as taken:
         taken.bind(("127.0.0.1", 0))
-        port = taken.getsockname()[1]
-        (found,) = installation.ports({port: "packets"})
-        assert found.level == WARNING and "pytest" in found.words and "wanted for packets" in found.words
-    (found,) = installation.ports({port: "packets"})
-    assert found == Found(OK, f"UDP port {port}", "free for packets")
+        if kind == "TCP":
+            taken.listen()
+        number = taken.getsockname()[1]
+        port = installation.Port(kind, number, "packets", ("no_such_program",), "choose another")
+        (found,) = installation.ports([port])
+        assert found.level == WARNING and "pytest" in found.words
+        assert found.words.endswith("wanted for packets: end that program, or choose another")
+        (found,) = installation.ports([port._replace(holders=("pytest",))])
+        assert found.level == OK and "held by a running program" in found.words
+    (found,) = installation.ports([port])
+    assert found == Found(OK, f"{kind} port {number}", "free for packets")
+
+
+def test_the_ports_looked_at_are_those_that_the_programs_listen_on_by_default() -> None:
+    assert {(port.kind, port.number) for port in installation.PORTS} == {
+        ("UDP", game_controller.REFEREE_PORT),
+        ("TCP", beside.PORT),
+        ("TCP", settings.PORT),
+    }
 
 
 def test_shared_memory_of_a_dead_process_is_told_and_that_of_a_living_one_is_not(

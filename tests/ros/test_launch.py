@@ -24,6 +24,7 @@ from tulip_ros.run import ComponentNode, session
 
 WAIT = 20.0  # [s] for things that take a fraction of a second
 
+TELLING = "import os, time; print('started again', os.environ['TULIP_RESTARTS'], flush=True); time.sleep(60)"
 SLEEP = "print('up', flush=True)\ntime.sleep(60)"
 STEADY = f"import signal, sys, time\nsignal.signal(signal.SIGTERM, lambda *_: sys.exit(0))\n{SLEEP}"
 STUBBORN = f"import signal, time\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\n{SLEEP}"
@@ -79,6 +80,14 @@ def test_killed_node_starts_again_and_the_other_is_left_alone(launch):
     assert not is_alive(again.pid) and not is_alive(other.pid)
 
 
+def test_a_node_is_told_how_many_times_it_was_started_again(launch):
+    with launch(a=TELLING) as launcher:
+        log = launcher.log_folder / "a.log"
+        wait_for(lambda: "started again 0" in log.read_text())
+        os.kill(launcher.states()[0].pid, signal.SIGKILL)
+        wait_for(lambda: launcher.poll() is not None and "started again 1" in log.read_text())
+
+
 def test_node_that_ignores_sigterm_is_killed(launch, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("tulip_ros.launch.PATIENCE", 0.2)
     with launch(a=STUBBORN) as launcher:
@@ -127,7 +136,7 @@ def test_monitor_hears_a_launched_node_and_its_recording_ends_with_it(ros_domain
         session(lambda: ComponentNode("listener", namespace="striker"), ["test"], handle_signals=False) as (node, spin),
     ):
         sums: list[DiagnosticArray] = []
-        monitor = Monitor(node, ["recorder"], states=launcher.states)
+        monitor = Monitor(node, ["recorder"])
         topics.DIAGNOSTICS_AGG.subscribe_from(node, sums.append)
         assert monitor.summary() == Report(Level.OK, "waits for recorder")
         wait_for(lambda: spin(0.1) or "processor [%]" in monitor.reports()["recorder"].values)

@@ -79,6 +79,14 @@ def test_messages_left_out_are_told_by_the_stamps_of_those_that_came(came: int, 
         assert found.words.startswith(f"takes {came} of 10 camera/image_raw")
 
 
+def test_the_latency_is_the_mean_since_it_was_last_asked_for_and_none_without_messages() -> None:
+    watch = camera()
+    for delay in (0.010, 0.030):
+        watch.served(delay)
+    assert watch.latency() == pytest.approx(0.020)
+    assert watch.latency() is None
+
+
 def test_stamps_of_before_time_began_anew_are_not_compared() -> None:
     watch = camera()
     watch.count, watch.stamp = 1, 100 * SECOND

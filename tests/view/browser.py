@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 from _environment import BROWSERS
 
+from tulip_sim.bench.faces_lookers.browser import SOFTWARE
+
 sync_api = pytest.importorskip(
     "playwright.sync_api",
     reason="playwright is not installed: pip install -e '.[browser]' (browsers are not downloaded)",
@@ -22,8 +24,6 @@ MARKS = [
     pytest.mark.browser,
     pytest.mark.skipif(CHROMIUM is None, reason=f"no browser on the PATH; expected one of {', '.join(BROWSERS)}"),
 ]
-SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
-"""WebGL without a graphics card."""
 PATIENCE = 240_000  # [ms] for a machine that is busy with other things
 
 

@@ -7,7 +7,6 @@ the joints' readings, which come the moment they are measured, and so knows the 
 from __future__ import annotations
 
 import bisect
-import socket
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,6 +20,7 @@ from tulip_ros import topics
 from tulip_ros.launch import Launcher
 from tulip_ros.run import session
 from tulip_ros.time import from_message, stamp_of
+from tulip_sim.bench.free_port import free_port
 from tulip_sim.bench.runner import Bench, Row
 from tulip_sim.match_graph import SILENCE, TrialWatcher, trial_plan
 
@@ -65,11 +65,8 @@ class LatencyWatcher(TrialWatcher):
 
 def measure(seed: int) -> Row:
     """Play one trial and watch it."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = int(probe.getsockname()[1])
     with (
-        Launcher(trial_plan(seed, referee_port=port)) as launcher,
+        Launcher(trial_plan(seed, referee_port=free_port())) as launcher,
         session(LatencyWatcher, arguments=[], handle_signals=False) as (watcher, spin),
     ):
         while watcher.truth is None or not (watcher.truth.outcome or watcher.truth.trial_time > WATCHED):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 
 import numpy as np
 
 from tulip_sim.bench import log_kill, log_match, log_recompute, log_replay, log_throughput
+from tulip_sim.bench.free_port import own_domain
 from tulip_sim.bench.runner import Bench, Row
 
 SHARE, SIZE, LOSS = 0.10, 150.0, 1.0  # asked for: of a core; [MB] of 10 minutes; [s] lost at most
@@ -37,7 +37,7 @@ TRIALS = [
 
 def measure(part: str, *arguments: float | str) -> Row:
     """Run one trial of a part."""
-    os.environ.setdefault("ROS_DOMAIN_ID", str(60 + os.getpid() % 40))  # no other graph on this machine is recorded
+    own_domain()  # no other graph on this machine is recorded
     return PARTS[part](*arguments)
 
 

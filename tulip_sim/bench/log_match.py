@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 import time
 from collections.abc import Callable
@@ -14,6 +13,7 @@ from tulip_ros.launch import Launcher
 from tulip_ros.log_file import Log
 from tulip_ros.run import ComponentNode, session
 from tulip_sim.bench.free_port import free_port
+from tulip_sim.bench.processor_time import processor_time
 from tulip_sim.bench.runner import Row
 from tulip_sim.match_graph import SILENCE, TrialWatcher, trial_plan
 from tulip_sim.match_rules import MatchRules
@@ -77,8 +77,7 @@ def _wait(
         if time.monotonic() - watcher.heard > SILENCE:
             raise RuntimeError(f"the simulator has said nothing for {SILENCE:.0f} s; see {launcher.log_folder}")
     pid = next(state.pid for state in launcher.states() if state.name == "recorder")
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return watcher.stamp, (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"), time.monotonic()
+    return watcher.stamp, processor_time(pid), time.monotonic()
 
 
 def _has_ended(watcher: ComponentNode) -> bool:

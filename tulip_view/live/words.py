@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from html import escape
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from tulip_ros import topics
+from tulip_ros.aggregation import by_topic
 from tulip_strategy.messages import tree_from_message
 from tulip_strategy.tree_drawing import SIGNS
 from tulip_strategy.tree_state import NodeStatus
@@ -28,9 +29,6 @@ LEVELS = {
     DiagnosticStatus.STALE: ("stale", RED),
 }
 SILENT = 3.0  # [s] without diagnostics, which come each second
-RATE = "rate "
-FIGURES = ("latency", "processor", "restarts")
-"""Values of a node's diagnostics that are shown beside its rate, by the beginning of their keys."""
 
 
 def game(buffers: Buffers) -> str:
@@ -70,31 +68,40 @@ def tree(buffers: Buffers) -> str:
 
 
 def health(buffers: Buffers) -> str:
-    """Return a table of the nodes: how they are, their fastest input, what else they tell of themselves."""
+    """Return a table of the nodes: how they are, their figures, what they say.
+
+    The rate is that of the fastest input, the latency that of the slowest; which ones these are shows where the mouse
+    rests on them.
+    """
     if not buffers.health:
         return "no diagnostics"
-    rows = []
+    columns = ("node", "", "rate [1/s]", "latency [ms]", "processor [%]", "restarts")
+    rows = [_row("th", [name.replace(" ", "<br>") for name in columns])]
     for name, (when, status) in sorted(buffers.health.items()):
         words, colour = LEVELS.get(status.level, ("unknown", RED))
         if buffers.now - when > SILENT:
             words, colour = "silent", RED
-        figures = {pair.key: pair.value for pair in status.values}
-        rates = {key.split()[1]: _number(value) for key, value in figures.items() if key.startswith(RATE)}
-        fastest = max(rates, key=lambda topic: rates[topic], default="")
-        shown = [f"{rates[fastest]:.0f}/s {fastest}"] if fastest else []
-        shown += [f"{key} {value}" for key, value in figures.items() if key.startswith(FIGURES)]
-        says = "" if status.message == "running" else f"<br>{escape(status.message)}"
-        rows.append(
-            f'<tr><td style="vertical-align:top">{escape(name)}</td>'
-            f'<td style="vertical-align:top;color:{colour}"><b>{words}</b></td>'
-            f"<td>{escape(', '.join(shown))}{says}</td></tr>"
-        )
-    return f'<table style="border-spacing:0.5em 0.1em">{"".join(rows)}</table>'
+        values = {pair.key: pair.value for pair in status.values}
+        cells = [escape(name), f'<b style="color:{colour}">{words}</b>']
+        cells += [_greatest(by_topic(values, "rate"), "{:.0f}"), _greatest(by_topic(values, "latency"), "{:.1f}")]
+        cells += [escape(values.get(key, "")) for key in ("processor [%]", "restarts")]
+        rows.append(_row("td", cells))
+        if status.message != "running":
+            rows.append(f'<td colspan="{len(columns)}" style="color:{colour}">{escape(status.message)}</td>')
+    lines = "".join(f"<tr>{row}</tr>" for row in rows)
+    return f'<table style="border-spacing:0.6em 0.1em">{lines}</table>'
 
 
-def _number(words: str) -> float:
-    """Return a number that somebody else wrote; NaN for one that is none."""
-    try:
-        return float(words)
-    except ValueError:
-        return math.nan
+def _row(tag: str, cells: Sequence[str]) -> str:
+    """Return the cells of a row: words to the left, figures to the right."""
+    sides = ("left", "left", *("right" for _ in cells[2:]))
+    return "".join(
+        f'<{tag} style="vertical-align:top;text-align:{side}">{cell}</{tag}>'
+        for side, cell in zip(sides, cells, strict=True)
+    )
+
+
+def _greatest(figures: dict[str, float], form: str) -> str:
+    """Return the greatest figure, with its topic as what a mouse that rests there is told."""
+    topic = max(figures, key=lambda each: figures[each], default="")
+    return f'<span title="{escape(topic)}">{form.format(figures[topic])}</span>' if topic else ""

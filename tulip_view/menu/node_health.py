@@ -12,9 +12,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
 from tulip_ros import topics
-from tulip_ros.aggregation import NOT_HEARD, STALE_AFTER, Report
+from tulip_ros.aggregation import NOT_HEARD, STALE_AFTER, Report, by_topic
 from tulip_ros.finding import Level
-from tulip_ros.monitor import RESTARTS, Monitor, input_rates, report_from_status
+from tulip_ros.monitor import Monitor, report_from_status
 from tulip_ros.recorder_node import RECORDING
 from tulip_view.menu.sight import NodeLine, Said
 
@@ -88,13 +88,13 @@ class NodeHealth:
 
 
 def _line(name: str, report: Report) -> NodeLine:
-    rates = input_rates(report)
+    rates = by_topic(report.values, "rate")
     fastest = max(rates, key=lambda topic: rates[topic], default="")
     return NodeLine(
         name,
         "starting" if report.words == NOT_HEARD else STATES[report.level],
         f"{rates[fastest]:.0f} {fastest}" if fastest else "",
         report.values.get("processor [%]", ""),
-        report.values.get(RESTARTS, ""),
+        report.values.get("restarts", ""),
         report.words,
     )
