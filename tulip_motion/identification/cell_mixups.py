@@ -17,7 +17,7 @@ from scipy.stats import chi2
 
 from tulip_description.model import Side
 from tulip_description.robot import Robot
-from tulip_motion.identification.body_prior import Spread, body_prior, greatest_mass_error
+from tulip_motion.identification.body_prior import Spread, body_prior, check_weight
 from tulip_motion.identification.com_regressor import PER_BODY, regressor_of
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.static_measurement import StaticMeasurement
@@ -99,13 +99,7 @@ def check_plausible(
     Raises:
         IdentificationError: if they cannot; names the mix-up that explains them, if one does.
     """
-    allowed = greatest_mass_error(robot, spread)
-    if abs(mass - robot.mass) > allowed:
-        raise IdentificationError(
-            f"the cells weigh {mass:.2f} kg, the robot {robot.variant} has {robot.mass:.2f} kg, and masses are taken to"
-            f" be known to {allowed:.2f} kg in all: the log belongs to another robot, or the cells' scale is wrong; if"
-            " it is this robot, state a larger spread of masses"
-        )
+    check_weight(robot, mass, spread)
     found, chi_square = _log_likelihood(robot, measurements, mass, spread, mount_spread)
     rivals = []
     for mixup in MIXUPS:

@@ -27,7 +27,7 @@ from tulip_motion.identification.inertial_prior import inertial_prior
 from tulip_motion.identification.joint_friction import identify_friction
 from tulip_motion.identification.motion_log import MotionLog
 from tulip_motion.identification.static_postures import PostureSolver
-from tulip_motion.identification.zmp_regressor import ZmpRegressor, parameters_of
+from tulip_motion.identification.zmp_regressor import CELL_PARAMETERS, ZmpRegressor, parameters_of
 from tulip_motion.identification.zmp_rows import ZmpRows, zmp_rows
 from tulip_motion.interface import Side
 from tulip_sim.bench.runner import Bench, Row
@@ -81,16 +81,16 @@ def identified_without(regressor: ZmpRegressor, rows: dict[str, ZmpRows], tested
 
 
 def true_parameters(true: Robot) -> Array:
-    """Return (10 b + 2,) parameters of a robot, and the spreads of cells whose sole carries on its rim."""
+    """Return (10 b + 3,) parameters of a robot, and of cells whose sole carries on its rim."""
     foot = true.feet[0]
     (heel, inner), (toe, outer) = foot.cells[0], foot.cells[3]
     length, width = (foot.x[1] - foot.x[0]) / (toe - heel), (foot.y[1] - foot.y[0]) / abs(outer - inner)
-    return np.concatenate([parameters_of(floating_model(true)), [length - 1.0, width - 1.0]])
+    return np.concatenate([parameters_of(floating_model(true)), [length - 1.0, width - 1.0, 0.0]])
 
 
 def believed_parameters(believed: Robot) -> Array:
-    """Return (10 b + 2,) parameters of the robot file, with cells as drawn."""
-    return np.concatenate([parameters_of(floating_model(believed)), [0.0, 0.0]])
+    """Return (10 b + 3,) parameters of the robot file, with cells as drawn."""
+    return np.concatenate([parameters_of(floating_model(believed)), np.zeros(CELL_PARAMETERS)])
 
 
 def measure(seed: int) -> Row:
@@ -118,7 +118,7 @@ def measure(seed: int) -> Row:
     mass, deviation = found.mass
     row["mass error [kg]"] = [round(believed.mass - true.mass, 3), round(mass - true.mass, 3), round(deviation, 3)]
     row["combinations learned"] = round(found.fit.learned, 1)
-    row["spreads"] = [round(float(spread), 3) for spread in found.spreads]
+    row["spreads"] = [round(float(spread), 3) for spread in found.cells[:2]]
     row["bodies moved"] = list(found.moved)
     row["deviations"] = _deviations(regressor, found, postures[:STATIC_POSTURES])
     row["friction"] = _friction(regressor, logs, found, seed)
