@@ -49,7 +49,7 @@ def check_result(regressor: ZmpRegressor, recordings: Sequence[ZmpRows], prior: 
         )
     reason = (
         _why_no_cells(found.parameters[-CELL_PARAMETERS:-1])
-        or _why_no_zmp([recording.error(found.parameters) for recording in recordings])
+        or _why_no_zmp(recordings, found.parameters)
         or _why_no_body(regressor, prior, found)
     )
     if reason:
@@ -75,14 +75,14 @@ def _why_no_cells(spreads: Array) -> str:
     return ""
 
 
-def _why_no_zmp(errors: Sequence[Array]) -> str:
-    """Return in which recording more is left of the ZMP's error (t, 2) [m] than a body can be to blame for, or ""."""
-    for number, error in enumerate(errors, start=1):
-        left = _length(error)
+def _why_no_zmp(recordings: Sequence[ZmpRows], parameters: Array) -> str:
+    """Return in which recording more is left of the ZMP's error than a body can be to blame for, or ""."""
+    for number, recording in enumerate(recordings, start=1):
+        left = recording.rms_error(parameters)
         if left > LARGEST_ERROR:
             return (
-                f"in recording {number} of {len(errors)} the ZMP of the best body is {1e3 * left:.1f} mm (RMS) beside"
-                f" the measured CoP; expected at most {1e3 * LARGEST_ERROR:.0f} mm"
+                f"in recording {number} of {len(recordings)} the ZMP of the best body is {1e3 * left:.1f} mm (RMS)"
+                f" beside the measured CoP; expected at most {1e3 * LARGEST_ERROR:.0f} mm"
             )
     return ""
 
@@ -113,12 +113,7 @@ def _swapped(recordings: Sequence[ZmpRows], prior: Prior) -> str:
 
     def left(cells: Array) -> float:
         parameters = np.append(prior.mean[:-CELL_PARAMETERS], cells)
-        return _length(np.concatenate([recording.error(parameters) for recording in recordings]))
+        return sum(recording.rms_error(parameters) for recording in recordings)
 
     best = min(MIRRORED, key=lambda name: left(MIRRORED[name]))
     return best if left(MIRRORED[best]) < FAR_BETTER * left(np.zeros(CELL_PARAMETERS)) else ""
-
-
-def _length(error: Array) -> float:
-    """Return the root mean square length of (t, 2) errors."""
-    return float(np.sqrt((error**2).sum(axis=1).mean()))

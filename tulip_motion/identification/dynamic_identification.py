@@ -112,13 +112,12 @@ def identify_dynamics(
     Raises:
         IdentificationError: if the recordings tell hardly more than the prior, or cannot be this robot's.
     """
-    spread = spread if spread is not None else Spread()
     if not recordings:
         raise IdentificationError("there are no recordings; expected one or more of squats, sways, leans or walks")
-    prior = _prior(regressor.robot, spread)
+    prior = dynamic_prior(regressor.robot, spread)
     best = prior.mean
     weight = float(np.concatenate([recording.force for recording in recordings]).mean())
-    check_weight(regressor.robot, weight / GRAVITY, spread)
+    check_weight(regressor.robot, weight / GRAVITY, spread if spread is not None else Spread())
     try:
         for _ in range(ROUNDS):
             found = fit([recording.equations(best) for recording in recordings], prior)
@@ -144,7 +143,7 @@ def identify_dynamics(
     return result
 
 
-def _prior(robot: Robot, spread: Spread) -> Prior:
+def dynamic_prior(robot: Robot, spread: Spread | None = None) -> Prior:
     """Return what is known of the inertial parameters and those of the cells, (10 b + 3,)."""
     known = inertial_prior(robot, spread)
     mean = np.concatenate([known.mean, np.zeros(CELL_PARAMETERS)])

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from tulip_description.robot import LEG_JOINTS, SIDES
 from tulip_motion.identification.correlated_fit import Fit, Prior, Series, fit
+from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.motion_log import MotionLog, smooth
 from tulip_motion.identification.zmp_regressor import PER_BODY, ZmpRegressor
 from tulip_motion.identification.zmp_rows import RowParameters, body_at, find_biases
@@ -111,7 +112,7 @@ def identify_friction(
         parameters: How friction is looked for.
 
     Raises:
-        ValueError: if no joint of a swinging leg moved.
+        IdentificationError: if no joint of a swinging leg moved, or the robot never rests.
     """
     p = parameters if parameters is not None else FrictionParameters()
     swings = [_Swing([], [], []) for _ in SIDES]
@@ -124,7 +125,7 @@ def identify_friction(
             if reason:
                 refused[name] = reason
     if len(refused) == len(LEG_JOINTS):
-        raise ValueError(
+        raise IdentificationError(
             f"no leg joint moved enough while its leg swung; {LEG_JOINTS[0]}: {refused[LEG_JOINTS[0]]}."
             " Expected a log of standing on one foot while the other leg swings"
         )

@@ -75,6 +75,10 @@ class ZmpRows(NamedTuple):
         away: Array = self._away(inertial) - self.ways @ spreads
         return away
 
+    def rms_error(self, parameters: Array) -> float:
+        """Return the root mean square length of `error` [m]."""
+        return float(np.sqrt((self.error(parameters) ** 2).sum(axis=1).mean()))
+
     def equations(self, parameters: Array) -> Series:
         """Return the equations near parameters (10 b + 3,), linear: (D4a) with (D5) [m], and (D10) [N].
 

@@ -18,6 +18,7 @@ from tulip_motion.identification.dynamic_identification import (
     DynamicIdentification,
     base_combinations,
     com_error,
+    dynamic_prior,
     identify_dynamics,
     knowledge,
     static_covariance,
@@ -27,7 +28,7 @@ from tulip_motion.identification.inertial_prior import inertial_prior
 from tulip_motion.identification.joint_friction import identify_friction
 from tulip_motion.identification.motion_log import MotionLog
 from tulip_motion.identification.static_postures import PostureSolver
-from tulip_motion.identification.zmp_regressor import CELL_PARAMETERS, ZmpRegressor, parameters_of
+from tulip_motion.identification.zmp_regressor import ZmpRegressor, parameters_of
 from tulip_motion.identification.zmp_rows import ZmpRows, zmp_rows
 from tulip_motion.interface import Side
 from tulip_sim.bench.runner import Bench, Row
@@ -88,11 +89,6 @@ def true_parameters(true: Robot) -> Array:
     return np.concatenate([parameters_of(floating_model(true)), [length - 1.0, width - 1.0, 0.0]])
 
 
-def believed_parameters(believed: Robot) -> Array:
-    """Return (10 b + 3,) parameters of the robot file, with cells as drawn."""
-    return np.concatenate([parameters_of(floating_model(believed)), np.zeros(CELL_PARAMETERS)])
-
-
 def measure(seed: int) -> Row:
     """Identify one robot."""
     true, believed = bodies(seed)
@@ -102,7 +98,7 @@ def measure(seed: int) -> Row:
     for name in TESTED:
         found = identified_without(regressor, rows, name)
         for model, parameters in (
-            ("wrong", believed_parameters(believed)),
+            ("wrong", dynamic_prior(believed).mean),
             ("identified", found.all_parameters),
             ("true", true_parameters(true)),
         ):
@@ -257,7 +253,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
         for axis, (plot, direction) in enumerate(zip(line, ("forward", "left"), strict=True)):
             plot.plot(part.times[shown], 1e3 * part.cop[shown, axis], "k", linewidth=2.0, label="measured CoP")
             for label, colour, parameters in (
-                ("robot file", "tab:red", believed_parameters(believed)),
+                ("robot file", "tab:red", dynamic_prior(believed).mean),
                 ("identified from other motions", "tab:green", found.all_parameters),
             ):
                 zmp = 1e3 * part.zmp(parameters)[shown, axis]
