@@ -62,7 +62,7 @@ def run(
     ] = "sim",
     body: Annotated[Path | None, typer.Option(help="Body file that is believed; none: robot.yaml.")] = None,
     secret: Annotated[
-        int | None, typer.Option(help="Seed of another body that the simulated robot has (lockstep).", min=0)
+        int | None, typer.Option(help="Seed of another body that the simulated robot has, untold.", min=0)
     ] = None,
     seed: Annotated[int, typer.Option(help="Of all noise in the simulation.", min=0)] = 1,
     record: Annotated[Path | None, typer.Option(help="New folder for the recording.")] = None,
@@ -76,8 +76,6 @@ def run(
     try:
         if mode not in MODES:
             raise BadInputError(f"--mode is {mode!r}; expected one of {', '.join(MODES)}.")
-        if mode == "graph" and secret is not None:
-            raise BadInputError("--secret is for the simulation in one process; expected --mode lockstep with it.")
         settings = ExperimentSettings("" if body is None else str(body.absolute()), PlanParameters(postures))
         folder = record or Path("recordings") / f"{datetime.now():%Y%m%d_%H%M%S}_identify"
         with progress() as bar:
@@ -88,7 +86,7 @@ def run(
                 bar.update(task, completed=now.held, description=f"{doing}, {now.seconds_left:.0f} s left")
 
             if mode == "graph":
-                end = run_graph(settings, driver, seed, folder, show, console.print)
+                end = run_graph(settings, driver, seed, folder, show, console.print, secret)
             else:
                 end = run_lockstep(settings, seed, folder, show, secret)
     except (BadInputError, ValueError) as error:
