@@ -226,7 +226,8 @@ def dynamic(
         _refuse(error)
     _print_table(console, "What motion tells [kg, kg m, kg m^2]", tables.DYNAMIC_HEADINGS, tables.dynamic_rows(found))
     if friction is not None:
-        _print_table(console, "Friction of the joints", tables.FRICTION_HEADINGS, tables.friction_rows(friction))
+        title = "Friction of the joints [N m], viscous by speed [N m s/rad]"
+        _print_table(console, title, tables.FRICTION_HEADINGS, tables.friction_rows(friction))
         for name, reason in friction.refused.items():
             console.print(f"{name:<17} {reason}", highlight=False)
     else:

@@ -72,7 +72,7 @@ DIFFERENCE_HEADINGS = ("base parameter, by the whole mass", "first [mm]", "secon
 DYNAMIC_HEADINGS = ("combination kept under", "believed", "found", "+-", "shows at rest")
 TOLD = 0.5
 """Standard deviation by that of the prior, up to which a combination counts as told."""
-FRICTION_HEADINGS = ("joint", "at [rad/s]", "friction [N m]", "Coulomb [N m]", "viscous [N m s/rad]")
+FRICTION_HEADINGS = ("joint", "rad/s", "in all", "Coulomb", "viscous")
 HIGHEST_SPEED = 1.0
 """Speed at which friction is told, if the joint moved so fast [rad/s]: better known there than its parts."""
 
@@ -101,6 +101,6 @@ def friction_rows(found: FrictionResult) -> list[Row]:
         speed = min(HIGHEST_SPEED, joint.highest_speed)
         torque, sigma = joint.torque(speed, found.coulomb_speed)
         coulomb, viscous = np.sqrt(np.diag(joint.covariance)[:2]).tolist()
-        parts = ((torque, sigma), (joint.coulomb, coulomb), (joint.viscous, viscous))
-        rows.append((name, f"{speed:.2f}", *(f"{value:.3f} +- {spread:.3f}" for value, spread in parts)))
+        parts = (f"{joint.coulomb:.2f} +- {coulomb:.2f}", f"{joint.viscous:.2f} +- {viscous:.2f}")
+        rows.append((name, f"{speed:.2f}", f"{torque:.3f} +- {sigma:.3f}", *parts))
     return rows
