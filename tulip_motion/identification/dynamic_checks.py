@@ -17,15 +17,16 @@ Array = NDArray[np.float64]
 
 LEAST_LEARNED = 5.0  # combinations; the CoM's two coordinates, mass, height and something that moves
 LARGEST_SPREAD = 0.5  # of the cells: the rim of a sole is not half as far out again as they are
-LARGEST_ERROR = 10e-3  # [m] of the ZMP, root mean square; a walk leaves 4 mm
+LARGEST_ERROR = 6e-3  # [m] of the ZMP, root mean square; squats and sways leave 2 mm, a walk 4
+DOUBT = 2.0  # times the prior's standard deviations: what filters and soles do to the ZMP ends up in the body, too
 ABSURD = 1e-9
 """Probability of a body, by the prior, below which it is not this robot's."""
 MIRRORED = {
-    "heel and toe cells": np.array([-2.0, 0.0, 0.0]),
-    "inner and outer cells": np.array([0.0, -2.0, 0.0]),
-    "heel and toe and inner and outer cells": np.array([-2.0, -2.0, 0.0]),
+    "heel and toe cells": (True, False),
+    "inner and outer cells": (False, True),
+    "heel and toe and inner and outer cells": (True, True),
 }
-"""Cells that are swapped have the CoP on the other side of their middle, which is a spread (D5) of -2."""
+"""Cells that are swapped have the CoP beyond their middle, along or across the sole: a spread (D5) of -2."""
 FAR_BETTER = 0.5
 """Share of the ZMP's error that is left, at most, when cells are swapped back that were swapped."""
 
@@ -53,7 +54,7 @@ def check_result(regressor: ZmpRegressor, recordings: Sequence[ZmpRows], prior: 
         or _why_no_body(regressor, prior, found)
     )
     if reason:
-        swapped = _swapped(recordings, prior)
+        swapped = _swapped(recordings, prior, found.parameters[-CELL_PARAMETERS:-1])
         raise IdentificationError(
             f"the CoP is where it would be if {swapped} of both feet are swapped ({reason}): correct the wiring or the"
             " order of the cells and record again"
@@ -95,7 +96,7 @@ def _why_no_body(regressor: ZmpRegressor, prior: Prior, found: Fit) -> str:
     """
     difference = found.parameters - prior.mean
     square = float(difference @ np.linalg.solve(prior.covariance, difference))
-    if chi2.sf(square, found.learned) > ABSURD:
+    if chi2.sf(square / DOUBT**2, found.learned) > ABSURD:
         return ""
     names = [f"{kind}({body})" for body in regressor.body_names for kind in PARAMETER_NAMES]
     away = np.abs(difference / np.sqrt(np.diag(prior.covariance)))
@@ -108,12 +109,16 @@ def _why_no_body(regressor: ZmpRegressor, prior: Prior, found: Fit) -> str:
     )
 
 
-def _swapped(recordings: Sequence[ZmpRows], prior: Prior) -> str:
-    """Return which cells are swapped, if the robot file explains the CoP far better so, or ""."""
+def _swapped(recordings: Sequence[ZmpRows], prior: Prior, spreads: Array) -> str:
+    """Return which cells are swapped, by the spreads (2,) that were found or by the robot file's ZMP, or ""."""
 
-    def left(cells: Array) -> float:
-        parameters = np.append(prior.mean[:-CELL_PARAMETERS], cells)
+    def left(along: bool, across: bool) -> float:
+        parameters = prior.mean.copy()
+        parameters[-CELL_PARAMETERS:-1] = -2.0 * along, -2.0 * across
         return sum(recording.rms_error(parameters) for recording in recordings)
 
-    best = min(MIRRORED, key=lambda name: left(MIRRORED[name]))
-    return best if left(MIRRORED[best]) < FAR_BETTER * left(np.zeros(CELL_PARAMETERS)) else ""
+    for name, (along, across) in MIRRORED.items():
+        if tuple(spreads < -1.0) == (along, across):
+            return name
+    best = min(MIRRORED, key=lambda name: left(*MIRRORED[name]))
+    return best if left(*MIRRORED[best]) < FAR_BETTER * left(False, False) else ""

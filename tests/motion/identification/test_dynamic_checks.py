@@ -10,7 +10,9 @@ from synthetic_motion import changed, swaying_log
 
 from tulip_description.robot import load_robot
 from tulip_motion.identification.body_prior import Spread
-from tulip_motion.identification.dynamic_identification import identify_dynamics
+from tulip_motion.identification.correlated_fit import Fit
+from tulip_motion.identification.dynamic_checks import check_result
+from tulip_motion.identification.dynamic_identification import dynamic_prior, identify_dynamics
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.motion_log import MotionLog
 from tulip_motion.identification.zmp_regressor import ZmpRegressor
@@ -46,9 +48,19 @@ def test_swapped_cells_are_named(log: MotionLog, order: tuple[int, ...], cells: 
         identify_dynamics(REGRESSOR, [rows_of(replace(log, foot_cells=log.foot_cells[:, :, list(order)]))])
 
 
-def test_body_beyond_the_stated_spread_is_refused_with_what_is_farthest_off(log: MotionLog) -> None:
-    with pytest.raises(IdentificationError, match=r"beyond belief .* in the robot file and would be .* away"):
-        identify_dynamics(REGRESSOR, [rows_of(log)], Spread(mass=0.05, com=0.001))
+@pytest.mark.parametrize(("shift", "refused"), [(0.06, False), (0.6, True)])
+def test_trunk_whose_com_is_20_deviations_ahead_is_refused_and_3_are_not(shift: float, refused: bool) -> None:
+    prior = dynamic_prior(BELIEVED)
+    trunk = BELIEVED.links[0].mass
+    parameters = prior.mean.copy()
+    parameters[1] += trunk * shift  # mx(base_link); 2 cm is one deviation of the trunk alone
+    told = Fit(parameters, 0.1 * prior.covariance, np.ones(3), np.ones(3), 30.0)
+    if refused:
+        words = r"beyond belief .* mx\(base_link\) is 1\.192 in the robot file and would be .* standard deviations away"
+        with pytest.raises(IdentificationError, match=words):
+            check_result(REGRESSOR, [], prior, told)
+    else:
+        check_result(REGRESSOR, [], prior, told)
 
 
 def test_cop_of_another_motion_is_refused_with_the_number_of_its_recording(log: MotionLog) -> None:
