@@ -235,11 +235,14 @@ def dynamic(
     believed = dynamic_prior(regressor.robot).mean
     for path, row in zip(recordings, rows, strict=True):
         before, after = (1e3 * row.rms_error(parameters) for parameters in (believed, found.all_parameters))
-        console.print(f"ZMP               off by {after:.1f} mm (RMS), before {before:.1f} mm: {path.name}")
+        told = f"ZMP               off by {after:.1f} mm (RMS), before {before:.1f} mm: {path.name}"
+        console.print(told, soft_wrap=True, highlight=False)
     mass, deviation = found.mass
     console.print(f"mass              {mass:.2f} kg +- {deviation:.2f} (believed: {regressor.robot.mass:.2f} kg)")
     along, across = (100.0 * found.cells[:2]).tolist()
-    console.print(f"cells             show {along:.0f} % too little of the CoP along the soles, {across:.0f} % across")
+    console.print(
+        f"CoP               {along:.0f} % farther out along the soles than the cells show, {across:.0f} % across"
+    )
     if output is not None:
         console.print(f"written           {output}", soft_wrap=True, highlight=False)
 
