@@ -7,9 +7,8 @@ import sys
 import _environment
 
 if __name__ == "__main__":
-    extras = ("bench",) if {"clik", "log", "vision"} & set(sys.argv) else ()  # what these compare with
-    extras += ("view", "bridge") if "faces" in sys.argv else ()
-    _environment.prepare((*extras, "mujoco") if "engines" in sys.argv else extras)
+    wants = {"bench": {"clik", "log", "vision"}, "view": {"faces"}, "bridge": {"faces"}, "mujoco": {"engines"}}
+    _environment.prepare(tuple(extra for extra, benches in wants.items() if benches & set(sys.argv)))
 
 import json
 from pathlib import Path

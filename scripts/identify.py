@@ -1,4 +1,4 @@
-"""Identify the robot's own body from static postures: run the experiment, fit, validate, compare."""
+"""Identify the robot's own body from static postures and from motion: run, fit, validate, compare, dynamic."""
 
 from __future__ import annotations
 
@@ -25,18 +25,26 @@ from tulip_description.body_file import BodySource, read_body, write_body
 from tulip_description.robot import Robot, load_robot
 from tulip_motion.identification.body_prior import Spread
 from tulip_motion.identification.com_identification import IdentificationSettings, identify_com
+from tulip_motion.identification.dynamic_body import com_of
+from tulip_motion.identification.dynamic_identification import DynamicIdentification, dynamic_prior, identify_dynamics
 from tulip_motion.identification.experiment_plan import PlanParameters
 from tulip_motion.identification.experiment_settings import ExperimentSettings
+from tulip_motion.identification.identification_error import IdentificationError
+from tulip_motion.identification.joint_friction import FrictionResult, identify_friction
+from tulip_motion.identification.motion_log import MotionLog
 from tulip_motion.identification.physical_consistency import as_body, most_probable_body
 from tulip_motion.identification.progress import Progress
 from tulip_motion.identification.static_measurement import StaticMeasurement
 from tulip_motion.identification.validation import Validation
 from tulip_motion.identification.validation import validate as validate_body
+from tulip_motion.identification.zmp_regressor import ZmpRegressor
+from tulip_motion.identification.zmp_rows import ZmpRows, zmp_rows
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_new_file
 from tulip_ros.log_file import files_of
 from tulip_sim.identify_graph import run_graph
 from tulip_sim.identify_lockstep import run_lockstep
 from tulip_view import identification as tables
+from tulip_view.recorded_sensors import motion_log_of
 from tulip_view.static_measurements import measurements_of
 
 MODES = ("lockstep", "graph")
@@ -54,7 +62,7 @@ def run(
     ] = "sim",
     body: Annotated[Path | None, typer.Option(help="Body file that is believed; none: robot.yaml.")] = None,
     secret: Annotated[
-        int | None, typer.Option(help="Seed of another body that the simulated robot has (lockstep).", min=0)
+        int | None, typer.Option(help="Seed of another body that the simulated robot has, untold.", min=0)
     ] = None,
     seed: Annotated[int, typer.Option(help="Of all noise in the simulation.", min=0)] = 1,
     record: Annotated[Path | None, typer.Option(help="New folder for the recording.")] = None,
@@ -68,8 +76,6 @@ def run(
     try:
         if mode not in MODES:
             raise BadInputError(f"--mode is {mode!r}; expected one of {', '.join(MODES)}.")
-        if mode == "graph" and secret is not None:
-            raise BadInputError("--secret is for the simulation in one process; expected --mode lockstep with it.")
         settings = ExperimentSettings("" if body is None else str(body.absolute()), PlanParameters(postures))
         folder = record or Path("recordings") / f"{datetime.now():%Y%m%d_%H%M%S}_identify"
         with progress() as bar:
@@ -80,7 +86,7 @@ def run(
                 bar.update(task, completed=now.held, description=f"{doing}, {now.seconds_left:.0f} s left")
 
             if mode == "graph":
-                end = run_graph(settings, driver, seed, folder, show, console.print)
+                end = run_graph(settings, driver, seed, folder, show, console.print, secret)
             else:
                 end = run_lockstep(settings, seed, folder, show, secret)
     except (BadInputError, ValueError) as error:
@@ -121,8 +127,7 @@ def fit(
             _tell_validation(console, _held_aside(believed, measured, settings, aside))
         found = identify_com(believed, measured, settings)
         whole = most_probable_body(found)
-        day = datetime.fromtimestamp(files_of(recording)[0].stat().st_mtime).date().isoformat()
-        write_body(output, as_body(found, whole, BodySource(recording.name, day, found.postures)))
+        write_body(output, as_body(found, whole, BodySource(recording.name, _day(recording), found.postures)))
     except (BadInputError, ValueError) as error:
         _refuse(error)
     _print_table(console, "What the postures tell", tables.BASE_HEADINGS, tables.base_rows(found))
@@ -185,6 +190,63 @@ def compare(
     console.print(f"CoM differs by {x:.2f} mm forwards, {y:.2f} mm sideways (RMS of {tables.POSTURES} postures)")
 
 
+@app.command()
+def dynamic(
+    recordings: Annotated[list[Path], typer.Argument(help="Of squats, sways, swings of a leg, walks; or of `run`.")],
+    output: Annotated[Path | None, typer.Option(help="Body file to write; none: only tell.")] = None,
+    body: Annotated[Path | None, typer.Option(help="Body file that is believed; none: robot.yaml.")] = None,
+    robot: Annotated[str, typer.Option(help="Namespace in the recordings.")] = "",
+    force: Annotated[bool, typer.Option("--force", help="Replace the output.")] = False,
+) -> None:
+    """Tell what motion adds: inertial parameters by the ZMP equation against the CoP, and the joints' friction.
+
+    The exit code is 0 if the motion told a body, 2 if the recordings are refused; then it says why.
+    """
+    console = Console()
+    try:
+        if output is not None:
+            check_new_file(output, "--output", force)
+        regressor = ZmpRegressor(_robot(body))
+        with progress() as bar:
+            task = bar.add_task("reading", total=len(recordings) + 2)
+            logs, rows = [], []
+            for path in recordings:
+                logs.append(motion_log_of(path, robot))
+                rows.append(_zmp_rows(path, regressor, logs[-1]))
+                bar.advance(task)
+            bar.update(task, description="fitting")
+            found = identify_dynamics(regressor, rows)
+            bar.update(task, description="friction", advance=1)
+            friction, no_friction = _friction(regressor, logs, found)
+        if output is not None:
+            com = com_of(found)
+            source = BodySource(", ".join(path.name for path in recordings), _day(recordings[-1]), 0)
+            write_body(output, as_body(com, most_probable_body(com), source))
+    except (BadInputError, ValueError) as error:
+        _refuse(error)
+    _print_table(console, "What motion tells [kg, kg m, kg m^2]", tables.DYNAMIC_HEADINGS, tables.dynamic_rows(found))
+    if friction is not None:
+        title = "Friction of the joints [N m], viscous by speed [N m s/rad]"
+        _print_table(console, title, tables.FRICTION_HEADINGS, tables.friction_rows(friction))
+        for name, reason in friction.refused.items():
+            console.print(f"{name:<17} {reason}", highlight=False)
+    else:
+        console.print(f"friction          not told: {no_friction}", highlight=False)
+    believed = dynamic_prior(regressor.robot).mean
+    for path, row in zip(recordings, rows, strict=True):
+        before, after = (1e3 * row.rms_error(parameters) for parameters in (believed, found.all_parameters))
+        told = f"ZMP               off by {after:.1f} mm (RMS), before {before:.1f} mm: {path.name}"
+        console.print(told, soft_wrap=True, highlight=False)
+    mass, deviation = found.mass
+    console.print(f"mass              {mass:.2f} kg +- {deviation:.2f} (believed: {regressor.robot.mass:.2f} kg)")
+    along, across = (100.0 * found.cells[:2]).tolist()
+    console.print(
+        f"CoP               {along:.0f} % farther out along the soles than the cells show, {across:.0f} % across"
+    )
+    if output is not None:
+        console.print(f"written           {output}", soft_wrap=True, highlight=False)
+
+
 def _robot(body: Path | None) -> Robot:
     return load_robot() if body is None else load_robot(body=body)
 
@@ -194,6 +256,28 @@ def _measured(recording: Path, robot: Robot, namespace: str) -> list[StaticMeasu
         task = bar.add_task("averaging", total=None)
         found = measurements_of(recording, robot, namespace, lambda number: bar.advance(task, number))
     return [measurement for _, measurement in found]
+
+
+def _zmp_rows(path: Path, regressor: ZmpRegressor, log: MotionLog) -> ZmpRows:
+    try:
+        return zmp_rows(regressor, log)
+    except ValueError as error:
+        raise BadInputError(f"Recording {path}: {error}.") from error
+
+
+def _friction(
+    regressor: ZmpRegressor, logs: Sequence[MotionLog], found: DynamicIdentification
+) -> tuple[FrictionResult | None, str]:
+    """Return the friction of the joints, or why the recordings do not tell it: the body they told stays."""
+    try:
+        return identify_friction(regressor, logs, found.prior), ""
+    except IdentificationError as error:
+        return None, str(error)
+
+
+def _day(recording: Path) -> str:
+    """Return the day of a recording."""
+    return datetime.fromtimestamp(files_of(recording)[0].stat().st_mtime).date().isoformat()
 
 
 def _held_aside(

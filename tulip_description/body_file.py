@@ -23,9 +23,9 @@ VERSION = 1
 HEAD = """\
 # Masses [kg], CoMs [m] in the links' frames, and principal moments about the CoMs [kg m^2] of a robot's links. They
 # take the place of those of robot.yaml: load_robot(body=...), and the parameter body_file of motion control.
-# Static postures tell the base parameters alone [m], by the whole mass, with their covariance [m^2]; model_error [m] is
-# what they leave of each CoP. How they are shared among links is the most probable way beside robot.yaml; inertias are
-# robot.yaml's, scaled by the masses. See docs/identification.md."""
+# Static postures and motion tell the base parameters [m], by the whole mass, with their covariance [m^2]; model_error
+# [m] is what they leave of each CoP. How they are shared among links is the most probable way beside robot.yaml;
+# inertias are robot.yaml's, scaled by the masses. See docs/identification.md."""
 
 
 class BodyFileError(ValueError):
@@ -39,7 +39,7 @@ class BodySource:
     Attributes:
         recording: The log that was fitted.
         date: Of the experiment, as in 2013-06-24.
-        postures: How many static postures it was fitted to.
+        postures: How many static postures it was fitted to; 0 for motion.
     """
 
     recording: str
@@ -184,7 +184,7 @@ def _source(entry: Mapping[str, Any]) -> BodySource:
         date.fromisoformat(str(day))
     except ValueError:
         raise _WrongError(f"source: date is {day!r}; expected as in 2013-06-24") from None
-    if not isinstance(postures, int) or isinstance(postures, bool) or postures < 1:
+    if not isinstance(postures, int) or isinstance(postures, bool) or postures < 0:
         raise _WrongError(f"source: postures is {postures!r}; expected a count")
     return BodySource(str(recording), str(day), postures)
 

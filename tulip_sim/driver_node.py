@@ -16,6 +16,7 @@ from tulip_sim.judging import Verdict
 from tulip_sim.referee import Referee, RefereeParameters
 from tulip_sim.referee_link import hear_replies, open_referee
 from tulip_sim.scenario import SCENARIOS, make_scenario
+from tulip_sim.secret_body import hidden_truth
 from tulip_sim.simulator_node import SimulatorNode, SimulatorParameters, Spin
 from tulip_sim.truth import Truth
 from tulip_sim.world import World
@@ -28,6 +29,7 @@ class DriverNodeParameters(SimulatorParameters):
     """How the simulator runs, and what it simulates."""
 
     scenario: str = "trial"
+    secret_body: int = -1  # seed of other masses and CoMs that the robot really has, untold; -1 for robot.yaml's
     rules: RefereeParameters = field(default_factory=RefereeParameters)
 
     def __post_init__(self) -> None:
@@ -39,6 +41,8 @@ class DriverNodeParameters(SimulatorParameters):
         super().__post_init__()
         if self.scenario not in SCENARIOS:
             raise ValueError(f"scenario is {self.scenario!r}; expected one of {', '.join(SCENARIOS)}")
+        if self.secret_body < -1:
+            raise ValueError(f"secret_body is {self.secret_body}; expected a seed >= 0, or -1 for none")
 
 
 class DriverNode(SimulatorNode):
@@ -66,9 +70,10 @@ class DriverNode(SimulatorNode):
     def _begin(self, scenario: str, seed: int) -> None:
         self._scenario_name = scenario
         start = make_scenario(scenario, np.random.default_rng(seed), self._field)
-        world = World(start, self._settings.world, seed, self._field, self._robot)
+        secret = self._settings.secret_body
+        body, world = hidden_truth(self._robot, self._settings.world, None if secret < 0 else secret)
         self._referee.restart()
-        self.begin_world(world, [[seed, 1]])
+        self.begin_world(World(start, world, seed, self._field, self._robot, true_body=body), [[seed, 1]])
 
     @property
     def interrupted(self) -> bool:

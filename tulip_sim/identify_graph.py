@@ -43,7 +43,9 @@ class Watcher(ComponentNode):
         self.progress, self.heard = progress_from_message(message), time.monotonic()
 
 
-def experiment_nodes(settings: ExperimentSettings, driver: str, seed: int, record: Path) -> tuple[Start, ...]:
+def experiment_nodes(
+    settings: ExperimentSettings, driver: str, seed: int, record: Path, secret: int | None = None
+) -> tuple[Start, ...]:
     """Return the nodes to start.
 
     Args:
@@ -51,10 +53,13 @@ def experiment_nodes(settings: ExperimentSettings, driver: str, seed: int, recor
         driver: Name of the driver, or "none" for one that runs already.
         seed: Of the simulation's noise.
         record: New folder for the recording.
+        secret: Seed of the body that the simulated robot has; None for that of robot.yaml.
 
     Raises:
-        BadInputError: for an unknown driver.
+        BadInputError: for an unknown driver, or one that has no secret body.
     """
+    if secret is not None and driver != "sim":
+        raise BadInputError(f"--secret is for a simulated robot; expected --driver sim with it, not {driver}.")
     nodes = ["identify", "recorder"]
     given: dict[str, dict[str, Any]] = {
         "identify": parameters.plain(settings),
@@ -66,6 +71,9 @@ def experiment_nodes(settings: ExperimentSettings, driver: str, seed: int, recor
     if driver == "sim":
         given["driver"] = {"scenario": "open", "seed": seed, "camera": False, "speed": 0.0, "wait_for": nodes}
         given["driver"]["referee"] = False
+    if secret is not None:
+        given["driver"]["secret_body"] = secret
+        given["recorder"]["notes"].append(f"secret_body={secret}")
     return make_plan(nodes, None if driver == "none" else driver, values=given)
 
 
@@ -76,6 +84,7 @@ def run_graph(
     record: Path,
     show: Callable[[Progress], None],
     say: Callable[[str], None],
+    secret: int | None = None,
 ) -> Progress:
     """Do the experiment; Ctrl-C aborts it, and a second one ends everything at once.
 
@@ -86,12 +95,13 @@ def run_graph(
         record: New folder for the recording.
         show: Told the progress.
         say: Told what happens to the processes, a line each.
+        secret: Seed of the body that the simulated robot has; None for that of robot.yaml.
 
     Raises:
         BadInputError: if a node refuses what it was given, or falls silent.
         KeyboardInterrupt: at the second Ctrl-C.
     """
-    plan = experiment_nodes(settings, driver, seed, record)
+    plan = experiment_nodes(settings, driver, seed, record, secret)
     with Launcher(plan) as launcher, session(Watcher, arguments=[], handle_signals=False) as (watcher, spin):
         aborted = False
         while watcher.progress is None or not watcher.progress.finished:

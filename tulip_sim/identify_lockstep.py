@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from tulip_description.planar import Pose2D
 from tulip_description.robot import load_robot
 from tulip_motion.identification.experiment_settings import ExperimentSettings, make_experiment
@@ -16,7 +14,7 @@ from tulip_sim.lockstep_notes import explain_experiment
 from tulip_sim.lockstep_recording import LockstepRecording, RecordedPictures
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.scenario import Scenario
-from tulip_sim.secret_body import secret_body
+from tulip_sim.secret_body import hidden_truth
 from tulip_sim.world import World
 
 ALONE = Scenario(robot=Pose2D(), ball=(0.0, -2.5), poles=False)
@@ -44,10 +42,8 @@ def run_lockstep(
         ValueError: if the settings fit no experiment.
     """
     experiment = make_experiment(settings)
-    # A secret body is the whole truth about the masses: it is what an identification is compared with.
-    parameters = WorldParameters() if secret is None else WorldParameters(mass_spread=0.0)
     robot = load_robot()
-    body = None if secret is None else secret_body(robot, np.random.default_rng(secret))
+    body, parameters = hidden_truth(robot, WorldParameters(), secret)
     recording = LockstepRecording(record, RecordedPictures("none"))
     world = World(ALONE, parameters, seed, robot=robot, true_body=body)
     try:

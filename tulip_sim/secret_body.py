@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tulip_description.robot import Link, Robot, load_robot, realizable_inertia
+from tulip_sim.parameters import WorldParameters
 
 UNLISTED = 0.001  # [kg] of a body that is on the robot and not in the team's table
 
@@ -34,6 +35,22 @@ def secret_body(robot: Robot, rng: np.random.Generator, mass_spread: float = 0.2
         x, y, z = (np.array(link.com) + rng.uniform(-com_spread, com_spread, 3)).tolist()
         links.append(replace(_scaled(link, scale), com=(x, y, z)))
     return replace(robot, links=tuple(links))
+
+
+def hidden_truth(robot: Robot, world: WorldParameters, seed: int | None) -> tuple[Robot | None, WorldParameters]:
+    """Return the body that a simulated robot really has, or None for that of `robot`, and the world to put it in.
+
+    A secret body is the whole truth about the masses, since an identification is compared with it: the world changes
+    them no further.
+
+    Args:
+        robot: As it is believed to be.
+        world: To put it in.
+        seed: Of the secret body; None for none.
+    """
+    if seed is None:
+        return None, world
+    return secret_body(robot, np.random.default_rng(seed)), replace(world, mass_spread=0.0)
 
 
 def table_robot() -> Robot:

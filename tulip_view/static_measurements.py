@@ -7,22 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from tulip_description.robot import Robot
-from tulip_description.robot_io import Sensors
 from tulip_motion.identification.averaging import HoldAverage
 from tulip_motion.identification.progress import Hold
 from tulip_motion.identification.static_measurement import StaticMeasurement
-from tulip_motion.messages import progress_from_message, sensors_from_messages
+from tulip_motion.messages import progress_from_message
 from tulip_ros import topics
 from tulip_ros.errors import BadInputError
 from tulip_ros.log_file import Log
-from tulip_ros.matching import SameStamp
-from tulip_ros.time import stamp_of
-from tulip_ros.topics import Topic
+from tulip_view.recorded_sensors import full_name, sensors_of
 
-SENSORS = (topics.JOINT_STATES, topics.IMU, topics.FOOT_FORCES)
 Advance = Callable[[int], None]
 """Is told how many postures were averaged since the last time."""
 
@@ -37,7 +32,7 @@ def holds_of(log: Log, namespace: str = "") -> tuple[Hold, ...]:
     Raises:
         BadInputError: if the recording is none of an experiment, or no posture was held in it.
     """
-    name = _full_name(topics.IDENTIFICATION, namespace)
+    name = full_name(topics.IDENTIFICATION, namespace)
     if name not in log.topics:
         raise BadInputError(f"Recording {log.path} has no topic {name}; expected one of scripts/identify.py run.")
     found: dict[int, Hold] = {}
@@ -69,21 +64,13 @@ def measurements_of(
     """
     with Log(path) as log:
         holds = holds_of(log, namespace)
-        averages = [HoldAverage(robot, hold.side) for hold in holds]
-        names = [_full_name(topic, namespace) for topic in SENSORS]
-        instants, present = SameStamp(*names), 0
-        # Recorders differ in their clocks: stamps alone say which readings count.
-        for record in log.records(names):
-            message = log.decode(record)
-            complete = instants.add(record.topic.name, stamp_of(message), message)
-            if complete is None:
-                continue
-            stamp = stamp_of(message)
-            while present < len(holds) and stamp > holds[present].end:
-                present += 1
-                advance(1)
-            if present < len(holds) and stamp >= holds[present].begin:
-                averages[present].add(_sensors(path, complete))
+    averages, present = [HoldAverage(robot, hold.side) for hold in holds], 0
+    for sensors in sensors_of(path, namespace):
+        while present < len(holds) and sensors.stamp > holds[present].end:
+            present += 1
+            advance(1)
+        if present < len(holds) and sensors.stamp >= holds[present].begin:
+            averages[present].add(sensors)
     found = []
     for hold, average in zip(holds, averages, strict=True):
         try:
@@ -91,14 +78,3 @@ def measurements_of(
         except ValueError as error:
             raise BadInputError(f"Recording {path}, posture {hold.posture}: {error}.") from error
     return tuple(found)
-
-
-def _sensors(path: Path, messages: tuple[Any, ...]) -> Sensors:
-    try:
-        return sensors_from_messages(*messages)
-    except ValueError as error:
-        raise BadInputError(f"Recording {path} is of another robot: {error}.") from error
-
-
-def _full_name(topic: Topic, namespace: str) -> str:
-    return f"/{topic.within(namespace).name}"

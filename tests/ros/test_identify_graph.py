@@ -6,21 +6,28 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from std_srvs.srv import Trigger
 
+from tulip_description.robot import load_robot
 from tulip_motion.identification.experiment_plan import PlanParameters
 from tulip_motion.identification.experiment_settings import ExperimentSettings
 from tulip_motion.identification.passages import Doing
 from tulip_motion.identification.progress import Progress
+from tulip_motion.lipm import GRAVITY
 from tulip_ros import topics
+from tulip_ros.errors import BadInputError
 from tulip_ros.launch import Launcher
 from tulip_ros.log_file import Log
 from tulip_ros.run import session
 from tulip_sim.identify_graph import Watcher, experiment_nodes
+from tulip_sim.secret_body import secret_body
+from tulip_view.recorded_sensors import sensors_of
 
 pytestmark = [pytest.mark.ros, pytest.mark.sim, pytest.mark.slow, pytest.mark.usefixtures("ros_domain")]
 
+SECRET = 3
 LONGEST = 120.0  # [s] of wall-clock time, after which the test has failed
 
 
@@ -28,7 +35,7 @@ def test_abort_by_the_service_ends_in_a_stand_and_the_recording_says_why(tmp_pat
     settings = ExperimentSettings(plan=PlanParameters(postures=9, candidates=40))
     record, last = tmp_path / "experiment", None
     with (
-        Launcher(experiment_nodes(settings, "sim", 1, record), tmp_path / "logs") as launcher,
+        Launcher(experiment_nodes(settings, "sim", 1, record, SECRET), tmp_path / "logs") as launcher,
         session(Watcher, arguments=[], handle_signals=False) as (watcher, spin),
     ):
         asked, end = False, time.monotonic() + LONGEST
@@ -44,6 +51,11 @@ def test_abort_by_the_service_ends_in_a_stand_and_the_recording_says_why(tmp_pat
     with Log(record) as log:
         names = {name for name, topic in log.topics.items() if topic.messages}
     assert {"/identification/progress", "/joint_states", "/imu", "/foot_forces", "/legs/joint_command"} <= names
+    believed = load_robot()
+    truth = secret_body(believed, np.random.default_rng(SECRET))
+    weights = [sensors.foot_cells.sum() / GRAVITY for sensors in sensors_of(record)]
+    assert np.mean(weights) == pytest.approx(truth.mass, rel=0.01)
+    assert abs(truth.mass - believed.mass) > 0.04 * believed.mass
 
 
 def test_node_that_waits_stands_until_the_service_begins_the_experiment(tmp_path: Path):
@@ -78,3 +90,9 @@ def test_node_that_waits_stands_until_the_service_begins_the_experiment(tmp_path
         assert ask() == (True, "")
         again = until(lambda progress: not progress.finished)
         assert (again.held, again.reason) == (0, "")
+
+
+@pytest.mark.parametrize("driver", ["none", "echo"])
+def test_secret_body_without_a_simulated_robot_is_refused(driver: str, tmp_path: Path):
+    with pytest.raises(BadInputError, match=f"expected --driver sim with it, not {driver}"):
+        experiment_nodes(ExperimentSettings(), driver, 1, tmp_path, SECRET)

@@ -124,7 +124,7 @@ class HoldAverage:
             down / np.linalg.norm(down),
             cop,
             covariance_of_mean(deviations),
-            float(loads.mean()),
+            forces.mean(axis=0),
         )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tulip_description.robot import Robot
 from tulip_motion.identification.com_regressor import PER_BODY, standard_parameters
+from tulip_motion.identification.identification_error import IdentificationError
 
 Array = NDArray[np.float64]
 
@@ -79,3 +80,23 @@ def body_prior(robot: Robot, spread: Spread, total_mass: float) -> BodyPrior:
 def greatest_mass_error(robot: Robot, spread: Spread) -> float:
     """Return by how much the whole robot's mass may differ from the file [kg]: all bodies err to one side."""
     return spread.mass * robot.mass + spread.unlisted * len(robot.links)
+
+
+def check_weight(robot: Robot, mass: float, spread: Spread) -> None:
+    """Check that what the cells weigh can be a robot.
+
+    Args:
+        robot: As it is believed to be.
+        mass: As the cells weigh it [kg].
+        spread: Of its bodies about the robot file.
+
+    Raises:
+        IdentificationError: if it cannot.
+    """
+    allowed = greatest_mass_error(robot, spread)
+    if abs(mass - robot.mass) > allowed:
+        raise IdentificationError(
+            f"the cells weigh {mass:.2f} kg, the robot {robot.variant} has {robot.mass:.2f} kg, and masses are taken to"
+            f" be known to {allowed:.2f} kg in all: the log belongs to another robot, or the cells' scale is wrong; if"
+            " it is this robot, state a larger spread of masses"
+        )

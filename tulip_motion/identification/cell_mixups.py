@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import NamedTuple, get_args
 
 import numpy as np
@@ -17,7 +18,7 @@ from scipy.stats import chi2
 
 from tulip_description.model import Side
 from tulip_description.robot import Robot
-from tulip_motion.identification.body_prior import Spread, body_prior, greatest_mass_error
+from tulip_motion.identification.body_prior import Spread, body_prior, check_weight
 from tulip_motion.identification.com_regressor import PER_BODY, regressor_of
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.static_measurement import StaticMeasurement
@@ -43,18 +44,16 @@ class Mixup(NamedTuple):
     undo: Callable[[Robot, StaticMeasurement], StaticMeasurement]
 
 
-def _mirrored(
-    signs: tuple[float, float], sides: tuple[Side, ...]
+def _reordered(
+    order: tuple[int, ...], sides: tuple[Side, ...]
 ) -> Callable[[Robot, StaticMeasurement], StaticMeasurement]:
-    """Mirror the CoP of some feet about the middle of their cells, on the axes whose sign is -1."""
+    """Take the cells of some feet in another order."""
 
     def undo(robot: Robot, measurement: StaticMeasurement) -> StaticMeasurement:
         if measurement.side not in sides:
             return measurement
-        sign = np.array(signs)
-        middle = np.mean(robot.feet[0 if measurement.side == "left" else 1].cells, axis=0)
-        cop = middle + sign * (measurement.cop - middle)
-        return replace(measurement, cop=cop, cop_covariance=measurement.cop_covariance * np.outer(sign, sign))
+        cells, places = measurement.cells[list(order)], robot.feet[get_args(Side).index(measurement.side)].cells
+        return replace(measurement, cop=cells @ np.array(places) / cells.sum(), cells=cells)
 
     return undo
 
@@ -66,15 +65,24 @@ def _other_foot(robot: Robot, measurement: StaticMeasurement) -> StaticMeasureme
     return replace(measurement, side=OTHER[measurement.side], cop=measurement.cop * sign, cop_covariance=covariance)
 
 
+def _exchanged(one: int, other: int) -> tuple[int, ...]:
+    order = [0, 1, 2, 3]
+    order[one], order[other] = other, one
+    return tuple(order)
+
+
+CELLS = ("heel inner", "heel outer", "toe inner", "toe outer")
+ORDERS: dict[str, tuple[int, ...]] = {
+    "heel and toe cells": (2, 3, 0, 1),
+    "inner and outer cells": (1, 0, 3, 2),
+    "heel and toe and inner and outer cells": (3, 2, 1, 0),
+    **{f"the {CELLS[a]} and {CELLS[b]} cells": _exchanged(a, b) for a, b in combinations(range(4), 2)},
+}
 MIXUPS: tuple[Mixup, ...] = (
     Mixup("the cells of the left and the right foot are swapped", _other_foot),
     *(
-        Mixup(f"{what} of {where} are swapped", _mirrored(signs, sides))
-        for what, signs in (
-            ("heel and toe cells", (-1.0, 1.0)),
-            ("inner and outer cells", (1.0, -1.0)),
-            ("heel and toe and inner and outer cells", (-1.0, -1.0)),
-        )
+        Mixup(f"{what} of {where} are swapped", _reordered(order, sides))
+        for what, order in ORDERS.items()
         for where, sides in (
             ("both feet", get_args(Side)),
             ("the left foot", ("left",)),
@@ -99,23 +107,22 @@ def check_plausible(
     Raises:
         IdentificationError: if they cannot; names the mix-up that explains them, if one does.
     """
-    allowed = greatest_mass_error(robot, spread)
-    if abs(mass - robot.mass) > allowed:
-        raise IdentificationError(
-            f"the cells weigh {mass:.2f} kg, the robot {robot.variant} has {robot.mass:.2f} kg, and masses are taken to"
-            f" be known to {allowed:.2f} kg in all: the log belongs to another robot, or the cells' scale is wrong; if"
-            " it is this robot, state a larger spread of masses"
-        )
-    found, chi_square = _log_likelihood(robot, measurements, mass, spread, mount_spread)
+    check_weight(robot, mass, spread)
+    expected = _Expected(robot, measurements, mass, spread, mount_spread)
+    found, chi_square = expected.log_likelihood(measurements)
     rivals = []
     for mixup in MIXUPS:
         undone = [mixup.undo(robot, measurement) for measurement in measurements]
-        rivals.append((*_log_likelihood(robot, undone, mass, spread, mount_spread), mixup.name))
-    best, best_chi_square, name = max(rivals)
+        same_feet = all(one.side == other.side for one, other in zip(undone, measurements, strict=True))
+        rival = expected if same_feet else _Expected(robot, undone, mass, spread, mount_spread)
+        rivals.append((*rival.log_likelihood(undone), mixup.name))
+    rivals.sort(reverse=True)
+    best, best_chi_square, _ = rivals[0]
     numbers = 2 * len(measurements)
     if best > found + FAR_LIKELIER and chi2.sf(best_chi_square, numbers) > ABSURD:
+        names = " or ".join(name for likelihood, _, name in rivals if likelihood > best - FAR_LIKELIER)
         raise IdentificationError(
-            f"the CoP is where it would be if {name}: correct the wiring or the order of the cells and measure again"
+            f"the CoP is where it would be if {names}: correct the wiring or the order of the cells and measure again"
         )
     if chi2.sf(chi_square, numbers) < ABSURD:
         raise IdentificationError(
@@ -125,29 +132,39 @@ def check_plausible(
         )
 
 
-def _log_likelihood(
-    robot: Robot, measurements: Sequence[StaticMeasurement], mass: float, spread: Spread, mount_spread: float
-) -> tuple[float, float]:
-    """Return the logarithm of the likelihood of measurements by the prior, up to a constant, and their chi^2."""
-    prior = body_prior(robot, spread, mass)
-    rows, nuisance, noise = [], [], []
-    for measurement in measurements:
-        posture = regressor_of(robot, measurement.side).cop(measurement.joint_positions, measurement.down)
-        rows.append(posture.cop)
-        nuisance.append(-float(posture.com[2] @ prior.mean) * posture.slope_change)
-        noise.append(measurement.cop_covariance)
-    stack, mounting = np.vstack(rows), np.vstack(nuisance)
-    # The masses add up to what was weighed: the prior under this condition.
-    total = np.tile(np.eye(PER_BODY)[0], len(robot.links))
-    mixed = prior.covariance @ total
-    gain = mixed / float(total @ mixed)
-    mean = prior.mean + gain * (1.0 - float(total @ prior.mean))
-    covariance = prior.covariance - np.outer(gain, mixed)
-    spread_of_cop = stack @ covariance @ stack.T + mount_spread**2 * mounting @ mounting.T
-    for index, each in enumerate(noise):
-        place = slice(2 * index, 2 * index + 2)
-        spread_of_cop[place, place] += each + ROUGHNESS**2 * np.eye(2)
-    error = np.concatenate([measurement.cop for measurement in measurements]) - stack @ mean
-    lower = np.linalg.cholesky(spread_of_cop)
-    chi_square = float(np.sum(np.linalg.solve(lower, error) ** 2))
-    return -0.5 * chi_square - float(np.log(np.diag(lower)).sum()), chi_square
+class _Expected:
+    """Where the CoP of postures is expected to be by the prior, and how sure that is."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        measurements: Sequence[StaticMeasurement],
+        mass: float,
+        spread: Spread,
+        mount_spread: float,
+    ) -> None:
+        prior = body_prior(robot, spread, mass)
+        rows, nuisance = [], []
+        for measurement in measurements:
+            posture = regressor_of(robot, measurement.side).cop(measurement.joint_positions, measurement.down)
+            rows.append(posture.cop)
+            nuisance.append(-float(posture.com[2] @ prior.mean) * posture.slope_change)
+        stack, mounting = np.vstack(rows), np.vstack(nuisance)
+        # The masses add up to what was weighed: the prior under this condition.
+        total = np.tile(np.eye(PER_BODY)[0], len(robot.links))
+        mixed = prior.covariance @ total
+        gain = mixed / float(total @ mixed)
+        mean = prior.mean + gain * (1.0 - float(total @ prior.mean))
+        covariance = prior.covariance - np.outer(gain, mixed)
+        spread_of_cop = stack @ covariance @ stack.T + mount_spread**2 * mounting @ mounting.T
+        for index, each in enumerate(measurements):
+            place = slice(2 * index, 2 * index + 2)
+            spread_of_cop[place, place] += each.cop_covariance + ROUGHNESS**2 * np.eye(2)
+        self._cop = stack @ mean
+        self._lower = np.linalg.cholesky(spread_of_cop)
+
+    def log_likelihood(self, measurements: Sequence[StaticMeasurement]) -> tuple[float, float]:
+        """Return the logarithm of the likelihood of these CoPs, up to a constant, and their chi^2."""
+        error = np.concatenate([measurement.cop for measurement in measurements]) - self._cop
+        chi_square = float(np.sum(np.linalg.solve(self._lower, error) ** 2))
+        return -0.5 * chi_square - float(np.log(np.diag(self._lower)).sum()), chi_square

@@ -1,9 +1,11 @@
 """Dynamic identification: the robot's inertial parameters from its ZMP while it moves.
 
 The paper plans it: "to perform dynamic experiments and fit model parameters in the equations of the Zero Moment Point
-(ZMP) position to experimental data of the CoP". The equations are (D3), one set for all recordings; of all parameters
-that explain them, the most probable with the robot file as prior (D8) is taken, by (D7) of `correlated_fit`, and of the
+(ZMP) position to experimental data of the CoP". The errors (D4) of all recordings are to be small; of all parameters
+that make them so, the most probable with the robot file as prior (D8) is taken, by (D7) of `correlated_fit`, and of the
 bodies that can be the nearest to it, (D9).
+
+The cells weigh the robot by (D10); moments, as (D4a) of `zmp_rows` has them, do not.
 
 Beside what static postures tell, accelerations weigh the robot (its mass in kg, not only shares of it), show how high
 the CoM lies without tilting it, and move moments of inertia. `knowledge` says in numbers what a recording told.
@@ -19,18 +21,21 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from tulip_description.model import floating_model
 from tulip_description.robot import Robot
 from tulip_motion.identification.base_parameters import reduce_columns
+from tulip_motion.identification.body_prior import Spread, check_weight
 from tulip_motion.identification.correlated_fit import Fit, Prior, fit
+from tulip_motion.identification.dynamic_checks import check_result
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.inertial_prior import inertial_prior
 from tulip_motion.identification.realizable_parameters import can_be, most_probable_bodies
 from tulip_motion.identification.zmp_regressor import (
+    CELL_PARAMETERS,
     PARAMETER_NAMES,
     PER_BODY,
-    SPREADS,
     BodyMotion,
     Ground,
     ZmpRegressor,
@@ -44,7 +49,9 @@ from tulip_motion.lipm import GRAVITY
 Array = NDArray[np.float64]
 
 CELL_SPREAD = 0.1  # standard deviation of the spreads (D5): the rim of the sole is 10 % farther out than the cells
-LEAST_LEARNED = 5.0  # combinations; the CoM's two coordinates, mass, height and something that moves
+GAIN_ERROR = 2e-3  # standard deviation of the gains (D10): what load cells and their mounting promise
+WEIGHT_ERROR = 0.02  # share of the weight that a result may differ by: ten standard deviations of the gains
+ROUNDS = 3  # of (D4a); the third changes parameters by less than a thousandth of their deviation
 FORCE_ERROR = 0.3  # [N] of the weight of a posture at rest: noise of eight cells over a second, and their resolution
 RANDOM_MOTIONS = 150  # for the structural rank: 450 rows for 150 columns
 
@@ -56,23 +63,23 @@ class DynamicIdentification:
     Attributes:
         robot: As it was believed to be; gives the kinematics.
         parameters: (10 b,) standard parameters of the moving bodies, see `ZmpRegressor.body_names`.
-        spreads: (2,) of the cells, along and across the soles.
-        covariance: (10 b + 2, 10 b + 2) of both, by the linear equations.
+        cells: (3,) their spreads along and across the soles, (D5), and the error of their gains, (D10).
+        covariance: (10 b + 3, 10 b + 3) of both, by the linear equations.
         moved: The bodies, by the link on their joint, that as the linear equations have them cannot be; see (D9).
         fit: Residuals, their correlation, and how many combinations were learned.
     """
 
     robot: Robot
     parameters: Array
-    spreads: Array
+    cells: Array
     covariance: Array
     moved: tuple[str, ...]
     fit: Fit
 
     @property
     def all_parameters(self) -> Array:
-        """(10 b + 2,) parameters and spreads, as `ZmpRows` takes them."""
-        return np.concatenate([self.parameters, self.spreads])
+        """(10 b + 3,) of the bodies and the cells, as `ZmpRows` takes them."""
+        return np.concatenate([self.parameters, self.cells])
 
     @property
     def prior(self) -> Prior:
@@ -93,42 +100,55 @@ class DynamicIdentification:
 
 
 def identify_dynamics(
-    regressor: ZmpRegressor, recordings: Sequence[ZmpRows], prior: Prior | None = None
+    regressor: ZmpRegressor, recordings: Sequence[ZmpRows], spread: Spread | None = None
 ) -> DynamicIdentification:
     """Find the inertial parameters of a robot.
 
     Args:
         regressor: Of the robot as it is believed to be; its bodies can be.
-        recordings: Squats, sways, leans, swings of the legs, walks.
-        prior: Of the standard parameters (10 b,); None for the robot file with the usual spread.
+        recordings: Squats, sways, leans, swings of the legs, walks; also long still ones.
+        spread: Of the links' masses and CoMs about the robot file; what is beyond plausible is refused.
 
     Raises:
         IdentificationError: if the recordings tell hardly more than the prior, or cannot be this robot's.
     """
-    known = prior if prior is not None else inertial_prior(regressor.robot)
-    inertial = len(known.mean)
-    covariance = np.zeros((inertial + SPREADS,) * 2)
-    covariance[:inertial, :inertial] = known.covariance
-    covariance[inertial:, inertial:] = CELL_SPREAD**2 * np.eye(SPREADS)
-    everything = Prior(np.concatenate([known.mean, np.zeros(SPREADS)]), covariance)
+    if not recordings:
+        raise IdentificationError("there are no recordings; expected one or more of squats, sways, leans or walks")
+    prior = dynamic_prior(regressor.robot, spread)
+    best = prior.mean
+    weight = float(np.concatenate([recording.force for recording in recordings]).mean())
+    check_weight(regressor.robot, weight / GRAVITY, spread if spread is not None else Spread())
     try:
-        found = fit([recording.equations for recording in recordings], everything)
+        for _ in range(ROUNDS):
+            found = fit([recording.equations(best) for recording in recordings], prior)
+            best = found.parameters
     except ValueError as error:
         raise IdentificationError(str(error)) from error
-    if found.learned < LEAST_LEARNED:
-        raise IdentificationError(
-            f"the recordings tell {found.learned:.1f} combinations of parameters better than the robot file; expected"
-            f" {LEAST_LEARNED:.0f} or more: add squats, sways and leans of larger amplitude"
-        )
-    parameters, spreads = found.parameters[:inertial], found.parameters[inertial:]
+    check_result(regressor, recordings, prior, found)
+    parameters, cells = np.split(best, [-CELL_PARAMETERS])
     moved = tuple(
         name
         for name, body in zip(regressor.body_names, parameters.reshape(-1, PER_BODY), strict=True)
         if not can_be(body)
     )
     start = parameters_of(floating_model(regressor.robot))
-    parameters = most_probable_bodies(parameters, found.covariance[:inertial, :inertial], start)
-    return DynamicIdentification(regressor.robot, parameters, spreads, found.covariance, moved, found)
+    parameters = most_probable_bodies(parameters, found.covariance[: len(start), : len(start)], start)
+    result = DynamicIdentification(regressor.robot, parameters, cells, found.covariance, moved, found)
+    if abs(GRAVITY * result.mass[0] - weight) > WEIGHT_ERROR * weight:
+        raise IdentificationError(
+            f"the most probable bodies that can be weigh {result.mass[0]:.2f} kg; expected what the cells weigh,"
+            f" {weight / GRAVITY:.2f} kg, to {WEIGHT_ERROR:.0%}: a body in the robot file is far from the truth;"
+            " correct robot.yaml, or add motions that tell more"
+        )
+    return result
+
+
+def dynamic_prior(robot: Robot, spread: Spread | None = None) -> Prior:
+    """Return what is known of the inertial parameters and those of the cells, (10 b + 3,)."""
+    known = inertial_prior(robot, spread)
+    mean = np.concatenate([known.mean, np.zeros(CELL_PARAMETERS)])
+    cells = np.diag([CELL_SPREAD, CELL_SPREAD, GAIN_ERROR]) ** 2
+    return Prior(mean, block_diag(known.covariance, cells))
 
 
 class Combination(NamedTuple):
@@ -191,7 +211,7 @@ def static_covariance(
         up = rotations[foot][:, 2]
         still, none = np.zeros(len(joints)), np.zeros(3)
         body = BodyMotion(joints, still, still, none, none, GRAVITY * up)
-        rows = regressor.rows(body, _ground_at(positions[foot], up))[:, :-SPREADS] / deviations[:, None]
+        rows = regressor.rows(body, _ground_at(positions[foot], up)) / deviations[:, None]
         information += rows.T @ rows
     covariance: Array = np.linalg.inv(information)
     return covariance
@@ -249,9 +269,9 @@ def _random_rows(regressor: ZmpRegressor, rng: np.random.Generator, moving: bool
     turning, change = share * rng.uniform(-2.0, 2.0, 3), share * rng.uniform(-10.0, 10.0, 3)
     force = GRAVITY * up + share * rng.uniform(-3.0, 3.0, 3)
     ground = _ground_at(regressor.soles(q)[0][0], up)
-    return regressor.rows(BodyMotion(q, rates, changes, turning, change, force), ground)[:, :-SPREADS]
+    return regressor.rows(BodyMotion(q, rates, changes, turning, change, force), ground)
 
 
 def _ground_at(point: Array, up: Array) -> Ground:
     """Return the ground of a robot whose CoP is some point (3,) of base_link: any spans the same rows."""
-    return Ground(up, horizontal_axes(up), point, point, np.zeros((3, SPREADS)), 1.0)
+    return Ground(up, horizontal_axes(up), point, point, np.zeros((3, 2)), 1.0)

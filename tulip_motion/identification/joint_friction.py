@@ -21,12 +21,15 @@ from numpy.typing import NDArray
 
 from tulip_description.robot import LEG_JOINTS, SIDES
 from tulip_motion.identification.correlated_fit import Fit, Prior, Series, fit
+from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.motion_log import MotionLog, smooth
 from tulip_motion.identification.zmp_regressor import PER_BODY, ZmpRegressor
 from tulip_motion.identification.zmp_rows import RowParameters, body_at, find_biases
 
 Array = NDArray[np.float64]
 PER_LEG = len(LEG_JOINTS) // len(SIDES)
+SURE = 3.0
+"""Standard deviations below zero from which on friction is refused as negative."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,7 @@ class FrictionParameters:
     friction_share: float = 0.1  # prior: standard deviation of F_c by the torque limit, and of F_v by that at 1 rad/s
     offset: float = 0.2  # [N m] prior: standard deviation of tau_0
     moving_speed: float = 0.15  # [rad/s] slower is no motion: sensors err by 0.005
+    negligible: float = 0.02  # [N m] by which friction may come out negative: torques err by as much
     moving_time: float = 0.5  # [s] in either direction at least, or the joint is refused
 
 
@@ -108,7 +112,7 @@ def identify_friction(
         parameters: How friction is looked for.
 
     Raises:
-        ValueError: if no joint of a swinging leg moved.
+        IdentificationError: if no joint of a swinging leg moved, or the robot never rests.
     """
     p = parameters if parameters is not None else FrictionParameters()
     swings = [_Swing([], [], []) for _ in SIDES]
@@ -121,7 +125,7 @@ def identify_friction(
             if reason:
                 refused[name] = reason
     if len(refused) == len(LEG_JOINTS):
-        raise ValueError(
+        raise IdentificationError(
             f"no leg joint moved enough while its leg swung; {LEG_JOINTS[0]}: {refused[LEG_JOINTS[0]]}."
             " Expected a log of standing on one foot while the other leg swings"
         )
@@ -142,7 +146,15 @@ def identify_friction(
             coulomb, viscous, offset = found.parameters[columns].tolist()
             fastest = max(float(np.abs(speeds[:, joint]).max()) for speeds in swings[side].speeds)
             covariance = found.covariance[np.ix_(columns, columns)]
-            joints[name] = Friction(coulomb, viscous, offset, covariance, fastest)
+            friction = Friction(coulomb, viscous, offset, covariance, fastest)
+            torque, deviation = friction.torque(fastest, best)
+            if torque < -max(p.negligible, SURE * deviation):
+                refused[name] = (
+                    f"would be {torque:.3f} +- {deviation:.3f} N m at {fastest:.1f} rad/s, and friction is never"
+                    " negative: check the sign of the torque sensor and the leg's masses"
+                )
+                continue
+            joints[name] = friction
             residuals[name] = float(found.deviations[joint])
     return FrictionResult(joints, refused, best, residuals)
 

@@ -50,9 +50,8 @@ class MotionLog:
         """
         if len(readings) < 2:
             raise ValueError(f"the log has {len(readings)} readings; expected at least some seconds of them")
-        steps = np.diff([reading.stamp for reading in readings])
-        period = int(np.median(steps))
-        if period <= 0 or not (np.abs(steps - period) < 0.5 * period).all():
+        steps, period = _steps(readings)
+        if period <= 0 or _gaps(steps, period).any():
             worst = int(np.abs(steps - period).argmax())
             raise ValueError(
                 f"readings {worst} and {worst + 1} are {steps[worst] * 1e-6:.1f} ms apart; expected"
@@ -81,6 +80,31 @@ class MotionLog:
         """(t,) since the first reading [s]."""
         times: Array = self.period * np.arange(len(self.joint_positions), dtype=float)
         return times
+
+
+def longest_part(readings: Sequence[Sensors]) -> Sequence[Sensors]:
+    """Return the longest part of a recording without a gap; a simulator's first reading may come out of step.
+
+    Args:
+        readings: In the order of time.
+    """
+    if len(readings) < 2:
+        return readings
+    borders = np.concatenate([[0], 1 + np.flatnonzero(_gaps(*_steps(readings))), [len(readings)]])
+    longest = int(np.diff(borders).argmax())
+    return readings[borders[longest] : borders[longest + 1]]
+
+
+def _steps(readings: Sequence[Sensors]) -> tuple[NDArray[np.int64], int]:
+    """Return the times between readings and the one that is usual [ns]."""
+    stamps = np.array([reading.stamp for reading in readings], dtype=np.int64)
+    steps = stamps[1:] - stamps[:-1]
+    return steps, int(np.median(steps))
+
+
+def _gaps(steps: NDArray[np.int64], period: int) -> NDArray[np.bool_]:
+    gaps: NDArray[np.bool_] = np.abs(steps - period) >= 0.5 * period
+    return gaps
 
 
 class SmoothMotion(NamedTuple):

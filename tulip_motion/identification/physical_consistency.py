@@ -16,6 +16,7 @@ all pseudo-inertias are positive definite. If no such body reproduces the base p
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +26,9 @@ from scipy.stats import chi2
 from tulip_description.body_file import Body, BodySource, links_of
 from tulip_description.pseudo_inertia import why_impossible
 from tulip_description.robot import Link, Robot, realizable_inertia
+from tulip_motion.identification.base_parameters import BaseParameters
 from tulip_motion.identification.body_prior import body_prior
-from tulip_motion.identification.com_identification import ComIdentification
+from tulip_motion.identification.com_identification import IdentificationSettings
 from tulip_motion.identification.com_regressor import PER_BODY
 from tulip_motion.identification.identification_error import IdentificationError
 
@@ -40,6 +42,38 @@ FARTHEST = 10.0
 REMEDY = "else look for a cell or an encoder that is off"
 IMPROBABLE = 1e-6
 """Probability of base parameters, given the best body, below which no body is taken to have them."""
+
+
+class IdentifiedCom(Protocol):
+    """What an identification of the CoM found, from postures or from motion; see `ComIdentification`."""
+
+    @property
+    def prior(self) -> Robot:
+        """The robot as it was believed to be."""
+
+    @property
+    def settings(self) -> IdentificationSettings:
+        """What was taken for granted."""
+
+    @property
+    def base(self) -> BaseParameters:
+        """Which combinations of standard parameters were identified."""
+
+    @property
+    def values(self) -> Array:
+        """(r,) these, by the whole mass [m]."""
+
+    @property
+    def covariance(self) -> Array:
+        """(r, r) of them [m^2]."""
+
+    @property
+    def mass(self) -> float:
+        """Of the whole robot [kg]."""
+
+    @property
+    def model_error(self) -> float:
+        """What is left of each CoP, standard deviation [m]."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +92,7 @@ class WholeBody:
     misfit: float
 
 
-def most_probable_body(found: ComIdentification) -> WholeBody:
+def most_probable_body(found: IdentifiedCom) -> WholeBody:
     """Return the most probable realizable body with the base parameters that were identified.
 
     Raises:
@@ -98,7 +132,7 @@ def most_probable_body(found: ComIdentification) -> WholeBody:
     return WholeBody(body, (1.0 - left).reshape(-1, PER_BODY), misfit)
 
 
-def as_body(found: ComIdentification, whole: WholeBody, source: BodySource) -> Body:
+def as_body(found: IdentifiedCom, whole: WholeBody, source: BodySource) -> Body:
     """Return what a body file keeps of an identification: the whole body, and the base parameters behind it."""
     links = links_of(whole.robot.links)
     names, error = found.base.names, found.model_error

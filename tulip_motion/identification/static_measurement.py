@@ -24,7 +24,7 @@ class StaticMeasurement:
             floor it tilts, and the CoP then lies below the CoM along this direction, not along the sole's normal.
         cop: (2,) centre of pressure of the stance foot in its sole frame [m].
         cop_covariance: (2, 2) of that mean [m^2].
-        normal_force: Sum of the stance foot's cells [N].
+        cells: (4,) forces of the stance foot's cells, heel inner, heel outer, toe inner, toe outer [N].
     """
 
     side: Side
@@ -32,7 +32,12 @@ class StaticMeasurement:
     down: Array
     cop: Array
     cop_covariance: Array
-    normal_force: float
+    cells: Array
+
+    @property
+    def normal_force(self) -> float:
+        """Sum of the stance foot's cells [N]."""
+        return float(self.cells.sum())
 
     def __post_init__(self) -> None:
         """Check shapes and numbers.
@@ -42,7 +47,7 @@ class StaticMeasurement:
         """
         if self.side not in ("left", "right"):
             raise ValueError(f"side is {self.side!r}; expected left or right")
-        shapes = (("joint_positions", (len(self.joint_positions),)), ("down", (3,)), ("cop", (2,)))
+        shapes = (("joint_positions", (len(self.joint_positions),)), ("down", (3,)), ("cop", (2,)), ("cells", (4,)))
         for name, shape in (*shapes, ("cop_covariance", (2, 2))):
             values = getattr(self, name)
             if values.shape != shape or not np.isfinite(values).all():

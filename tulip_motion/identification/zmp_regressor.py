@@ -21,6 +21,10 @@ CoP's way from the middle of a foot too short or too long. Two spreads a are par
 
     o = o_cells + a_x (way along the sole) + a_y (way across)                              (D5)
 
+and so is the error g that the gains of all cells have in common, which no motion tells from a mass:
+
+    sum of the cells = (1 + g) u . F                                                       (D10)
+
 All of it is written in axes of base_link. Inertial forces do not depend on where the base is or how fast it goes, only
 on its rotation and on the specific force that an accelerometer at base_link would feel, f = a - g: no position,
 no heading and no speed have to be estimated.
@@ -40,8 +44,8 @@ from tulip_description.robot import Robot
 
 Array = NDArray[np.float64]
 PER_BODY = 10
-SPREADS = 2
-"""Of the cells, along and across the soles; see eq. (D5)."""
+CELL_PARAMETERS = 3
+"""Spreads of the cells along and across the soles, eq. (D5), and the error of their gains, eq. (D10)."""
 PARAMETER_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 """Of each moving body, in Pinocchio's order: mass [kg], first moments [kg m] and inertia [kg m^2] about its joint."""
 
@@ -98,10 +102,7 @@ def with_parameters(model: Any, parameters: Array) -> Any:
 
 
 class ZmpRegressor:
-    """Y of eq. (D2), and the rows of eq. (D3) with (D5).
-
-    Their parameters are pi, (10 b,), followed by the `SPREADS` spreads of the cells.
-    """
+    """Y of eq. (D2), and the rows of eq. (D3)."""
 
     def __init__(self, robot: Robot) -> None:
         """Make the regressor of a robot; of its parameters it uses the kinematic ones alone."""
@@ -151,17 +152,15 @@ class ZmpRegressor:
         return Ground(up, horizontal_axes(up), soles, cop, ways, force)
 
     def rows(self, motion: BodyMotion, ground: Ground) -> Array:
-        """Return (3, 10 b + 2) rows of (D3), whose products shall be 0 forward and left [N m], and the force [N].
+        """Return (3, 10 b) rows of (D3), whose products shall be 0 forward and left [N m], and the force [N].
 
-        The first two are u x M_o, which for the parameters of (D5) is the force times the way from the CoP to the ZMP.
+        The first two are u x M_o, which is the force times the way from the CoP to the ZMP.
         """
         base = self.inverse_dynamics(motion)[:6]
         force, moment = base[:3], base[3:] - np.cross(ground.cop, base[:3], axisb=0, axisc=0)
         forward, left = ground.horizontal
-        rows = np.zeros((3, base.shape[1] + SPREADS))
         # u x M forward is -(left . M), and to the left it is forward . M.
-        rows[:, :-SPREADS] = np.stack([-left @ moment, forward @ moment, ground.up @ force])
-        rows[:2, -SPREADS:] = -ground.force * ground.horizontal @ ground.ways
+        rows: Array = np.stack([-left @ moment, forward @ moment, ground.up @ force])
         return rows
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tulip_motion.identification.correlated_fit import Series
 from tulip_motion.identification.identification_error import IdentificationError
 from tulip_motion.identification.motion_log import MotionLog, SmoothMotion, smooth
-from tulip_motion.identification.zmp_regressor import BodyMotion, ZmpRegressor
+from tulip_motion.identification.zmp_regressor import CELL_PARAMETERS, BodyMotion, ZmpRegressor
 from tulip_motion.lipm import GRAVITY
 
 Array = NDArray[np.float64]
@@ -44,30 +44,67 @@ class Biases(NamedTuple):
 
 
 class ZmpRows(NamedTuple):
-    """Equations (D3) at t instants.
+    """Equations (D3) at t instants. Their parameters are pi, (10 b,), and those of the cells, (3,): (D5) and (D10).
 
     Attributes:
         times: (t,) since the start of the recording [s].
-        equations: Design (t, 3, 10 b + 2) and target (t, 3) of (D3).
+        rows: (t, 3, 10 b) of (D3).
+        ways: (t, 2, 2) what the spreads of (D5) add to the CoP, forward and left [m].
+        force: (t,) vertical, of all cells [N].
         cop: (t, 2) as the cells say, forward and left of the soles' mean [m].
         biases: Found at rest.
     """
 
     times: Array
-    equations: Series
+    rows: Array
+    ways: Array
+    force: Array
     cop: Array
     biases: Biases
 
     def zmp(self, parameters: Array) -> Array:
-        """Return (t, 2) ZMP that parameters (10 b + 2,) predict for the cells, forward and left of the soles' mean [m].
+        """Return (t, 2) ZMP that parameters (10 b + 3,) predict for the cells, forward and left of the soles' mean [m].
 
         With spreads of the cells, it is the place where those cells would show it, as far as the error is small.
         """
         return self.cop + self.error(parameters)
 
     def error(self, parameters: Array) -> Array:
-        """Return (t, 2) way from the measured CoP to the ZMP that parameters (10 b + 2,) predict [m], eq. (D4)."""
-        along, left, force = np.moveaxis(self.equations.design @ parameters, 1, 0)
+        """Return (t, 2) way from the measured CoP to the ZMP that parameters (10 b + 3,) predict [m], (D4), (D5)."""
+        inertial, (*spreads, _) = np.split(parameters, [-CELL_PARAMETERS])
+        away: Array = self._away(inertial) - self.ways @ spreads
+        return away
+
+    def rms_error(self, parameters: Array) -> float:
+        """Return the root mean square length of `error` [m]."""
+        return float(np.sqrt((self.error(parameters) ** 2).sum(axis=1).mean()))
+
+    def equations(self, parameters: Array) -> Series:
+        """Return the equations near parameters (10 b + 3,), linear: (D4a) with (D5) [m], and (D10) [N].
+
+        Where the ZMP lies does not depend on how heavy the robot is, if all masses grow alike. (D3), homogeneous, would
+        say otherwise: the smaller the masses, the smaller its errors, and a fit that weighs equations by their errors
+        ends at none. (D4) itself, near pi_k, where it is e_k, is
+
+            e(pi) = e_k + (u x M_o - e_k u . F) / (u . F of pi_k)                                          (D4a)
+
+        which is e_k for every multiple of pi_k; and it takes moments about the predicted ZMP, not about the noisy CoP.
+        For the same reason the error of the gains multiplies the predicted force, not the measured one.
+        """
+        inertial = parameters[:-CELL_PARAMETERS]
+        away, force = self._away(inertial), self.rows[:, 2]
+        weight = force @ inertial
+        design = np.zeros((len(self.times), 3, len(parameters)))
+        moments = self.rows[:, :2] - away[:, :, None] * force[:, None, :]
+        design[:, :2, :-CELL_PARAMETERS] = moments / weight[:, None, None]
+        design[:, :2, -CELL_PARAMETERS:-1] = -self.ways
+        design[:, 2, :-CELL_PARAMETERS] = force
+        design[:, 2, -1] = weight
+        return Series(design, np.column_stack([-away, self.force]))
+
+    def _away(self, inertial: Array) -> Array:
+        """Return (t, 2) way from the CoP, as the cells show it, to the ZMP of inertial parameters (10 b,) [m]."""
+        along, left, force = np.moveaxis(self.rows @ inertial, 1, 0)
         away: Array = np.stack([along, left], axis=1) / force[:, None]
         return away
 
@@ -95,14 +132,14 @@ def zmp_rows(regressor: ZmpRegressor, log: MotionLog, parameters: RowParameters 
         )
     every = max(1, round(1.0 / (p.row_rate * log.period)))
     chosen = [t for t in range(edge, len(force) - edge, every) if force[t] > p.least_force]
-    design, target, cop = [], [], []
+    rows, ways, cop = [], [], []
     for t in chosen:
         body = body_at(regressor, motion, biases, t)
         ground = regressor.ground(motion.q[t], biases.tilt @ motion.up[t], motion.foot_cells[t])
-        design.append(regressor.rows(body, ground))
-        target.append([0.0, 0.0, ground.force])
+        rows.append(regressor.rows(body, ground))
+        ways.append(ground.horizontal @ ground.ways)
         cop.append(ground.horizontal @ (ground.cop - ground.soles))
-    return ZmpRows(log.times[chosen], Series(np.array(design), np.array(target)), np.array(cop), biases)
+    return ZmpRows(log.times[chosen], np.array(rows), np.array(ways), force[chosen], np.array(cop), biases)
 
 
 def body_at(regressor: ZmpRegressor, motion: SmoothMotion, biases: Biases, t: int) -> BodyMotion:

@@ -18,6 +18,7 @@ from tulip_motion.identification.dynamic_identification import (
     DynamicIdentification,
     base_combinations,
     com_error,
+    dynamic_prior,
     identify_dynamics,
     knowledge,
     static_covariance,
@@ -81,16 +82,11 @@ def identified_without(regressor: ZmpRegressor, rows: dict[str, ZmpRows], tested
 
 
 def true_parameters(true: Robot) -> Array:
-    """Return (10 b + 2,) parameters of a robot, and the spreads of cells whose sole carries on its rim."""
+    """Return (10 b + 3,) parameters of a robot, and of cells whose sole carries on its rim."""
     foot = true.feet[0]
     (heel, inner), (toe, outer) = foot.cells[0], foot.cells[3]
     length, width = (foot.x[1] - foot.x[0]) / (toe - heel), (foot.y[1] - foot.y[0]) / abs(outer - inner)
-    return np.concatenate([parameters_of(floating_model(true)), [length - 1.0, width - 1.0]])
-
-
-def believed_parameters(believed: Robot) -> Array:
-    """Return (10 b + 2,) parameters of the robot file, with cells as drawn."""
-    return np.concatenate([parameters_of(floating_model(believed)), [0.0, 0.0]])
+    return np.concatenate([parameters_of(floating_model(true)), [length - 1.0, width - 1.0, 0.0]])
 
 
 def measure(seed: int) -> Row:
@@ -102,7 +98,7 @@ def measure(seed: int) -> Row:
     for name in TESTED:
         found = identified_without(regressor, rows, name)
         for model, parameters in (
-            ("wrong", believed_parameters(believed)),
+            ("wrong", dynamic_prior(believed).mean),
             ("identified", found.all_parameters),
             ("true", true_parameters(true)),
         ):
@@ -118,7 +114,7 @@ def measure(seed: int) -> Row:
     mass, deviation = found.mass
     row["mass error [kg]"] = [round(believed.mass - true.mass, 3), round(mass - true.mass, 3), round(deviation, 3)]
     row["combinations learned"] = round(found.fit.learned, 1)
-    row["spreads"] = [round(float(spread), 3) for spread in found.spreads]
+    row["spreads"] = [round(float(spread), 3) for spread in found.cells[:2]]
     row["bodies moved"] = list(found.moved)
     row["deviations"] = _deviations(regressor, found, postures[:STATIC_POSTURES])
     row["friction"] = _friction(regressor, logs, found, seed)
@@ -257,7 +253,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
         for axis, (plot, direction) in enumerate(zip(line, ("forward", "left"), strict=True)):
             plot.plot(part.times[shown], 1e3 * part.cop[shown, axis], "k", linewidth=2.0, label="measured CoP")
             for label, colour, parameters in (
-                ("robot file", "tab:red", believed_parameters(believed)),
+                ("robot file", "tab:red", dynamic_prior(believed).mean),
                 ("identified from other motions", "tab:green", found.all_parameters),
             ):
                 zmp = 1e3 * part.zmp(parameters)[shown, axis]

@@ -134,5 +134,5 @@ def _averaged(side: Side, joints: Array, down: Array, forces: Array, cells: Arra
     cop = mean @ cells / total
     change = (cells - cop) / total
     return StaticMeasurement(
-        side, joints, down / np.linalg.norm(down), cop, change.T @ np.diag(variance) @ change, total
+        side, joints, down / np.linalg.norm(down), cop, change.T @ np.diag(variance) @ change, mean
     )

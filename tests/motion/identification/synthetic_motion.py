@@ -12,6 +12,8 @@ from tulip_description.model import floating_model
 from tulip_description.posture import standing_posture
 from tulip_description.robot import Robot
 from tulip_motion.identification.motion_log import MotionLog
+from tulip_motion.identification.zmp_regressor import BodyMotion, Ground, ZmpRegressor, horizontal_axes, parameters_of
+from tulip_motion.identification.zmp_rows import Biases, ZmpRows
 
 Array = NDArray[np.float64]
 PERIOD = 0.004
@@ -101,6 +103,40 @@ def swaying_log(
         columns["specific_force"].append(base_force + np.cross(change, imu) + np.cross(turning, np.cross(turning, imu)))
     assert n == posture.size
     return MotionLog(PERIOD, **{name: np.array(values) for name, values in columns.items()})
+
+
+def still_rows(true: Robot, rng: np.random.Generator, postures: int, force_error: float) -> ZmpRows:
+    """Return a long quasi-static recording: 6 s in each of many postures, as the static experiment has them.
+
+    The CoP errs by 1 mm from row to row, the force by 1 N, and by `force_error` [N], up or down, as long as a posture
+    lasts: cells of unlike gains.
+    """
+    regressor, parameters = ZmpRegressor(true), parameters_of(floating_model(true))
+    standing, none, each = standing_posture(true).joint_positions, np.zeros(3), 150
+    still = np.zeros(len(standing))
+    rows, forces = [], []
+    for _ in range(postures):
+        up = np.array([*rng.normal(scale=0.1, size=2), 1.0])
+        up /= np.linalg.norm(up)
+        motion = BodyMotion(standing + rng.uniform(-0.3, 0.3, len(standing)), still, still, none, none, 9.81 * up)
+        at_origin = Ground(up, horizontal_axes(up), none, none, np.zeros((3, 2)), 1.0)
+        exact = regressor.rows(motion, at_origin)
+        x, y, force = exact @ parameters
+        noisy = np.repeat(exact[None], each, axis=0)
+        # A CoP that moves by d across the vertical takes d times the force off the moments.
+        noisy[:, :2] -= (np.array([x, y]) / force + rng.normal(scale=1e-3, size=(each, 2)))[:, :, None] * exact[2]
+        rows.append(noisy)
+        forces.append(force + force_error * rng.choice([-1.0, 1.0]) + rng.normal(size=each))
+    count = each * postures
+    unbiased = Biases(np.eye(3), none, none)
+    return ZmpRows(
+        0.04 * np.arange(count),
+        np.concatenate(rows),
+        np.zeros((count, 2, 2)),
+        np.concatenate(forces),
+        np.zeros((count, 2)),
+        unbiased,
+    )
 
 
 def _cells(

@@ -104,7 +104,7 @@ def _set(*keys: str | int, value: Any) -> Callable[[Any], None]:
         (_set("links", "neck", "com", value=[0, 1, float("nan")]), "links, neck: com is .* expected 3 numbers"),
         (_set("links", "neck", "inertia", value=[9.0, 1.0, 1.0]), "links, neck: its pseudo-inertia is not positive"),
         (_set("source", "date", value="yesterday"), "source: date is 'yesterday'; expected as in 2013-06-24"),
-        (_set("source", "postures", value=0), "source: postures is 0; expected a count"),
+        (_set("source", "postures", value=-1), "source: postures is -1; expected a count"),
         (_set("base_covariance", 0, 1, value=1e-9), "base_covariance is not symmetric and positive semidefinite"),
         (_set("base_covariance", value=[]), "are expected to be lists of one length"),
         (_set("base_parameters", 0, "value", value=None), "base_parameters: value is None; expected a number"),

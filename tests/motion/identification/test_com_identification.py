@@ -113,7 +113,11 @@ def test_sum_of_all_masses_is_known_and_what_the_cells_weigh(held: Held) -> None
         ((1, 0, 3, 2), ("left", "right"), "inner and outer cells of both feet are swapped"),
         ((1, 0, 3, 2), ("left",), "inner and outer cells of the left foot are swapped"),
         ((3, 2, 1, 0), ("left", "right"), "heel and toe and inner and outer cells of both feet are swapped"),
-        ((1, 0, 2, 3), ("left", "right"), "no swap of cells explains it"),
+        ((1, 0, 2, 3), ("left", "right"), "heel inner and heel outer cells of both feet are swapped"),
+        ((1, 0, 2, 3), ("left",), "heel inner and heel outer cells of the left foot are swapped"),
+        ((0, 3, 2, 1), ("right",), "heel outer and toe outer cells of the right foot are swapped"),
+        ((3, 1, 2, 0), ("left",), "heel inner and toe outer cells of the left foot are swapped"),
+        ((1, 2, 3, 0), ("left", "right"), "no swap of cells explains it"),
     ],
 )
 @pytest.mark.parametrize("prior", [ROBOT, table_robot()], ids=["playing", "table"])
@@ -203,7 +207,7 @@ def test_a_robot_with_other_joints_is_another_robot(held: Held) -> None:
 
 def test_a_posture_that_the_other_foot_helped_to_hold_is_named(held: Held) -> None:
     _, measurements = sound(held)
-    measurements[7] = replace(measurements[7], normal_force=0.8 * measurements[7].normal_force)
+    measurements[7] = replace(measurements[7], cells=0.8 * measurements[7].cells)
     with pytest.raises(IdentificationError, match=r"posture 7 weighs .* stance foot did not carry the robot alone"):
         identify_com(ROBOT, measurements)
 

@@ -23,6 +23,7 @@ from tulip_sim.secret_body import secret_body
 from tulip_sim.world import World
 
 BELIEVED = load_robot()
+TRUE = changed(BELIEVED, np.random.default_rng(3))
 REGRESSOR = ZmpRegressor(BELIEVED)
 COULOMB = np.linspace(0.2, 0.9, 14)
 VISCOUS = np.linspace(0.5, 0.1, 14)
@@ -32,8 +33,7 @@ RIGHT = LEG_JOINTS[6:]
 
 @pytest.fixture(scope="module")
 def log() -> MotionLog:
-    true = changed(BELIEVED, np.random.default_rng(3))
-    return swaying_log(true, joint_amplitude=0.3, trunk_amplitude=0.02, friction=(COULOMB, VISCOUS, SPEED))
+    return swaying_log(TRUE, joint_amplitude=0.3, trunk_amplitude=0.02, friction=(COULOMB, VISCOUS, SPEED))
 
 
 def test_both_frictions_are_found_in_spite_of_a_wrong_body(log: MotionLog) -> None:
@@ -64,6 +64,18 @@ def test_joint_that_hardly_moves_is_refused_by_name_and_the_others_are_not(log: 
     assert "right_knee" not in result.joints
     assert "moved forwards faster than 0.15 rad/s for 0.00 s only" in result.refused["right_knee"]
     assert "right_hip_pitch" in result.joints
+
+
+def test_friction_that_drives_a_joint_is_refused_by_name(log: MotionLog) -> None:
+    knee = np.array(BELIEVED.joint_names) == "right_knee"
+    swapped = log.joint_efforts - 2.0 * knee * (log.joint_efforts - _frictionless().joint_efforts)
+    result = identify_friction(REGRESSOR, [replace(log, joint_efforts=swapped)], inertial_prior(BELIEVED))
+    assert "friction is never negative" in result.refused["right_knee"]
+    assert set(result.joints) == set(RIGHT) - {"right_knee"}
+
+
+def _frictionless() -> MotionLog:
+    return swaying_log(TRUE, joint_amplitude=0.3, trunk_amplitude=0.02)
 
 
 def test_log_in_which_no_leg_swings_is_refused() -> None:
