@@ -33,12 +33,12 @@ INPUTS: dict[str, Input] = {
     each.topic.name: each
     for each in (
         Input(topics.JOINT_STATES, 0.02, WINDOW, "angles of the neck, measured torques"),
-        Input(topics.HEAD_JOINT_COMMAND, 0.02, WINDOW),
+        Input(topics.HEAD_JOINT_COMMAND, 0.04, WINDOW),
         Input(topics.MOTION_STATE, 0.02, WINDOW, "CoM, ZMP and DCM, soles, curves of the joints"),
         Input(topics.FOOTSTEPS, without="planned footsteps"),
         Input(topics.ODOMETRY, 0.02, 2.0, "the robot's attitude and height, and so its picture"),
         Input(topics.WORLD_STATE, 0.04, WINDOW, "the robot's place, ball and opponents as it believes them to be"),
-        Input(topics.GROUND_TRUTH, 0.02, WINDOW, "the truth (as on a real robot)"),
+        Input(topics.GROUND_TRUTH, 0.04, WINDOW, "the truth (as on a real robot)"),
         Input(topics.FEATURES, 0.0, 2.0, "features in the camera's picture"),
         Input(topics.CAMERA_INFO),
         Input(topics.CAMERA_COMPRESSED, 0.2, 2.0, "the camera's picture"),

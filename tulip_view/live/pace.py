@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-FASTEST, SLOWEST = 12.0, 2.0  # [1/s]
+FASTEST, SLOWEST = 10.0, 2.0  # [1/s]
 SHARE = 0.25  # of the time at most is spent on drawing here
 BROWSER_SHARE = 0.4  # of the time at most the browser is to draw; without a graphics card that takes a core
 KEPT = 6  # answers: some of them came while the browser drew, and waited for all of that
