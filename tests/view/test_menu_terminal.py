@@ -114,7 +114,9 @@ def test_keys_change_the_topic_the_screen_shows_it_and_limp_is_there_soon(tmp_pa
         terminal.press("w", *["Up"] * 10, "l", *["Up"] * 5)  # all at once, as from a key that is held down
         until(lambda: robot.commands[-1].request == UserCommand.LIMP)
         limp = len(robot.commands)
-        terminal.press("w", "Up")
+        terminal.press("w")
+        until(lambda: "walk forward +0.00" in terminal.text)
+        terminal.press("Up")
         until(lambda: list(robot.commands[-1].velocity) == [0.05, 0.0, 0.0])
         after = [each.velocity[0] for each in robot.commands[limp:]]
         assert after == [0.0, 0.05] and robot.commands[limp].request == UserCommand.WALK_TEST

@@ -158,6 +158,7 @@ class Menu(App[None]):
 
     def action_walk_test(self) -> None:
         """Begin the walk test, or go on with it, by stepping in place."""
+        self.refresh_sight()  # a command from before is no answer to this one
         self._send_speeds(STANDING)
 
     def action_stand_still(self) -> None:
