@@ -271,7 +271,9 @@ USER_WISH = Topic(
     "what a person wants, from viewers that publish; checked as set_user_command, stamp and sequence are not read",
 )
 GAME_STATE = Topic("game_state", GameState, LATCHED, ("game_input",), ("strategy",), "the referee's view of the game")
-USER_COMMAND = Topic("user_command", UserCommand, LATCHED, ("user_input",), ("strategy",), "the user's last wish")
+USER_COMMAND = Topic(
+    "user_command", UserCommand, LATCHED, ("user_input",), ("strategy", "identify"), "the user's last wish"
+)
 WALK_COMMAND = Topic(
     "walk_command",
     WalkCommand,

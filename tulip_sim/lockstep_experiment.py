@@ -47,7 +47,7 @@ def run_experiment(
             tell(
                 "ground_truth",
                 now,
-                (world.truth(), Verdict("", (0, 0), experiment.fallen, int(experiment.fallen), 0.0)),
+                (world.truth(), Verdict("", (0, 0), experiment.is_limp, int(experiment.is_limp), 0.0)),
             )
             if told is None or _differs(progress, told):
                 told = progress

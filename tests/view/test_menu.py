@@ -109,18 +109,6 @@ def test_limp_is_one_key_away_whatever_is_open_and_closes_it(opened: str, key: s
     assert robot.wishes == [Wish(UserRequest.LIMP)]
 
 
-def test_limp_ends_an_experiment_that_has_the_legs():
-    robot = CoreRobot()
-    robot.sight = replace(robot.sight, experiment=UNDER_WAY)
-
-    @using(robot)
-    async def _(screen: Screen) -> None:
-        assert "identification 2/18, move, 61 s left" in screen.text
-        await screen.press("l")
-
-    assert robot.experiments == [False] and robot.wishes == [Wish(UserRequest.LIMP)]
-
-
 def test_walk_test_follows_the_keys_within_its_limits():
     robot = CoreRobot()
 

@@ -2,7 +2,7 @@
 
 A state machine like `tulip_motion.motion.Motion`: each tick turns one reading of the sensors into one command, here for
 all joints, the head's too. Whatever `Watch` finds, and `abort`, makes the robot turn round on the road that it is on,
-go home over the plan's roads, put the foot down and stand; a robot that falls goes limp.
+go home over the plan's roads, put the foot down and stand; a robot that falls, or is told so, goes limp.
 """
 
 from __future__ import annotations
@@ -80,19 +80,20 @@ class Experiment:
         """One a hold."""
         self.reason = ""
         """Why the experiment was aborted, or ""."""
-        self.fallen = False
+        self.is_limp = False
+        """Whether the legs are without stiffness, and stay so: the robot falls, or somebody said so."""
 
     @property
     def finished(self) -> bool:
         """Whether the robot stands on both feet again, or lies, and nothing is left to do."""
-        return self.fallen or (self._here is not None and self._now is STANDING and not self._ahead)
+        return self.is_limp or (self._here is not None and self._now is STANDING and not self._ahead)
 
     @property
     def progress(self) -> Progress:
         """How far it has come."""
         left = sum(self._usual_time(passage) for passage in (self._now, *self._ahead)) - self._elapsed
         return Progress(
-            Doing.LIMP if self.fallen else self._now.doing,
+            Doing.LIMP if self.is_limp else self._now.doing,
             self._now.posture,
             self._postures,
             len(self.holds),
@@ -124,14 +125,24 @@ class Experiment:
                     break
             self._ahead = deque((*kept, STANDING))
 
+    def go_limp(self, reason: str) -> None:
+        """Let the legs go, from the next command on and for good; the head stays up.
+
+        Args:
+            reason: In words, for the report.
+        """
+        if not self.is_limp:
+            self.is_limp, self.reason = True, self.reason or reason
+
     def tick(self, sensors: Sensors) -> JointCommand:
         """Return the command for all joints that answers one reading of the sensors."""
         if self._here is None:
             self._start(sensors)
         now, control = self._now, self._control
         control.body.update(sensors, now.stance)
-        if self.fallen or self._watch.is_falling(sensors, control.body):
-            self.fallen, self.reason = True, self.reason or "the robot falls"
+        if self._watch.is_falling(sensors, control.body):
+            self.go_limp("the robot falls")
+        if self.is_limp:
             return control.limp(sensors)
         share, position, velocity = self._reference()
         command = control.command(sensors, now.stance, share, position, velocity)

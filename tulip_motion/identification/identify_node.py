@@ -11,6 +11,7 @@ from tulip_motion.identification.experiment import Experiment
 from tulip_motion.identification.experiment_plan import FootPlan, make_plan
 from tulip_motion.identification.experiment_settings import ExperimentSettings
 from tulip_motion.messages import joint_command_to_message, progress_to_message, sensors_from_messages
+from tulip_msgs.msg import UserCommand
 from tulip_ros import topics
 from tulip_ros.errors import BadInputError
 from tulip_ros.matching import SameStamp
@@ -18,6 +19,7 @@ from tulip_ros.run import ComponentNode, run
 from tulip_ros.time import stamp_of
 
 REPORT_TICKS = 25  # progress goes out at 10 Hz
+TOLD_LIMP = "the user wants the robot limp"
 
 
 class IdentifyNode(ComponentNode):
@@ -27,6 +29,7 @@ class IdentifyNode(ComponentNode):
         """Plan, which takes some seconds, and connect."""
         super().__init__("identify")
         p = self._settings = self.load(ExperimentSettings())
+        self._told_limp = False
         try:
             self._robot = p.robot
             self._plans = make_plan(self._robot, p.plan, p.posture)
@@ -38,6 +41,7 @@ class IdentifyNode(ComponentNode):
         self.listen(topics.JOINT_STATES, lambda message: self._on_sensor("joint_states", message))
         self.listen(topics.IMU, lambda message: self._on_sensor("imu", message))
         self.listen(topics.FOOT_FORCES, lambda message: self._on_sensor("foot_forces", message))
+        self.listen(topics.USER_COMMAND, self._on_user_command)
         for service, answer in (
             (topics.BEGIN_IDENTIFICATION, self._on_begin),
             (topics.ABORT_IDENTIFICATION, self._on_abort),
@@ -68,13 +72,23 @@ class IdentifyNode(ComponentNode):
         if self._tick % REPORT_TICKS == 0:
             self._progress.publish(progress_to_message(self._experiment.progress))
 
+    def _on_user_command(self, message: UserCommand) -> None:
+        self._told_limp = message.request == UserCommand.LIMP
+        if self._told_limp:
+            self._experiment.go_limp(TOLD_LIMP)
+
     def _make_experiment(self, plans: Sequence[FootPlan]) -> Experiment:
         """Return an experiment; without plans, one that only stands."""
-        return Experiment(self._robot, plans, self._settings.experiment)
+        experiment = Experiment(self._robot, plans, self._settings.experiment)
+        if self._told_limp:
+            experiment.go_limp(TOLD_LIMP)
+        return experiment
 
     def _on_begin(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        if self._experiment.fallen:
-            response.message = "the robot has fallen: set it upright, and start node identify again"
+        if self._told_limp:
+            response.message = "the user's last wish is limp: wish for something else first"
+        elif self._experiment.is_limp:
+            response.message = "the robot is limp: set it upright, and start node identify again"
         elif self._experiment.progress.postures and not self._experiment.finished:
             response.message = "the experiment is under way"
         else:

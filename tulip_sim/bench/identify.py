@@ -79,7 +79,7 @@ def measure(case: str, seed: int) -> Row:
         "held": end.held,
         "postures": end.postures,
         "aborted": end.reason,
-        "fallen": experiment.fallen,
+        "fallen": experiment.is_limp,
         "experiment [s]": round(world.stamp * 1e-9),
     }
     try:

@@ -135,11 +135,8 @@ class Menu(App[None]):
             self._parts[name].update(draw())
 
     def action_limp(self) -> None:
-        """Make the robot limp, whatever is open; an experiment, which has the legs, is ended, too."""
+        """Make the robot limp, whatever is open."""
         self._send(Wish(UserRequest.LIMP))
-        experiment = self._sight.experiment
-        if experiment is not None and not experiment.finished:
-            self._robot.identify(False)
         while len(self.screen_stack) > 1:
             self.pop_screen()
 

@@ -13,7 +13,7 @@ import pytest
 from tulip_description.model import floating_model
 from tulip_description.planar import Pose2D
 from tulip_description.quaternion import quaternion_matrix
-from tulip_description.robot import Robot, load_robot
+from tulip_description.robot import HEAD_JOINTS, Robot, load_robot
 from tulip_motion.identification.experiment import Experiment
 from tulip_motion.identification.experiment_plan import FootPlan, PlanParameters, make_plan
 from tulip_motion.identification.passages import Doing
@@ -102,7 +102,7 @@ def test_abort_in_every_passage_leads_to_a_stand_on_both_feet(doing: Doing, plan
 
     end = run_experiment(experiment, world, watch=watch, longest=60.0)
     assert (end.finished, end.reason, end.doing) == (True, "the test wants it", Doing.STAND)
-    assert not experiment.fallen
+    assert not experiment.is_limp
     assert stands_on_both_feet(world)
 
 
@@ -117,6 +117,19 @@ def disturbed(world: World, experiment: Experiment, disturb: Callable[[], None])
             disturb()
 
     return run_experiment(experiment, world, watch=watch, longest=60.0)
+
+
+def test_a_robot_that_is_told_to_go_limp_lets_its_legs_go_and_stays_so(plans: tuple[FootPlan, ...], world: World):
+    experiment = Experiment(ROBOT, plans)
+    end = disturbed(world, experiment, lambda: experiment.go_limp("the test wants it"))
+    assert (end.doing, end.reason, end.finished) == (Doing.LIMP, "the test wants it", True)
+    command = experiment.tick(world.sensors())
+    legs = [name not in HEAD_JOINTS for name in command.names]
+    assert sum(legs) == 12
+    assert not np.any(command.stiffness[legs]) and not np.any(command.effort[legs])
+    assert not stands_on_both_feet(world)
+    experiment.abort("too late")
+    assert experiment.progress.reason == "the test wants it"
 
 
 def test_a_push_that_throws_the_robot_over_makes_it_limp(plans: tuple[FootPlan, ...], world: World):
