@@ -23,6 +23,7 @@ from tulip_ros.cdr import HEAD
 from tulip_ros.serialized import after_header, time_at
 from tulip_sim.recompute.heard import OVERDUE, UNIX_TIME, Heard, Made
 from tulip_vision.features import Features
+from tulip_worldmodel.landmark_geometry import rehearse
 from tulip_worldmodel.messages import (
     features_from_message,
     map_to_odom_message,
@@ -53,6 +54,7 @@ class WorldModelStage:
             field: As the robot's team sees it.
             start: Where the robot was told to stand at the beginning of its run; None where nobody noted it.
         """
+        rehearse()  # here, so that a process beside inherits what is compiled
         self._parameters, self._field = parameters, field
         self._odometry: deque[Odometry] = deque()
         self._features: deque[Features] = deque()
