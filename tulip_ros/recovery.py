@@ -21,8 +21,9 @@ from tulip_ros import bag_metadata, mcap_scan
 from tulip_ros.bag_metadata import FileEntry, TopicEntry
 from tulip_ros.errors import BadInputError
 from tulip_ros.log_edit import making_room
-from tulip_ros.log_file import MAGIC, REPEATED, Log, files_of
-from tulip_ros.mcap_file import LIBRARY, Chunk, McapFile
+from tulip_ros.log_file import REPEATED, Log, files_of
+from tulip_ros.log_index import DAMAGES
+from tulip_ros.mcap_file import LIBRARY, MAGIC, Chunk, McapFile
 from tulip_ros.mcap_scan import Data, Found
 
 Advance = Callable[[int], None]
@@ -194,29 +195,37 @@ class _Source:
         elif opcode in (Opcode.MESSAGE, Opcode.ATTACHMENT, Opcode.METADATA):
             self.pieces.append(found)
             self.chunks += opcode == Opcode.MESSAGE
-            if opcode == Opcode.METADATA and read(Metadata, data, found).name == REPEATED:
+            note = read(Metadata, data, found) if opcode == Opcode.METADATA else None
+            if note is not None and note.name == REPEATED:
                 self._first_number = None  # the file goes on where another one ended
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             self._define(bytes(data[found.begin : found.end]))
         elif opcode == Opcode.STATISTICS:
             self._statistics = read(Statistics, data, found)
-        elif opcode == Opcode.HEADER and read(Header, data, found).library == LIBRARY:
-            self._first_number = -1  # messages are numbered from 0 on
+        elif opcode == Opcode.HEADER:
+            header = read(Header, data, found)
+            if header is not None and header.library == LIBRARY:
+                self._first_number = -1  # messages are numbered from 0 on
 
     def _define(self, content: bytes) -> None:
         for opcode, begin, end in mcap_scan.records(content):
             whole = Found(opcode, begin - mcap_scan.HEAD.size, end)
             if opcode == Opcode.SCHEMA:
                 schema = read(Schema, content, whole)
-                self.schemas.setdefault(schema.id, schema)
+                if schema is not None:
+                    self.schemas.setdefault(schema.id, schema)
             elif opcode == Opcode.CHANNEL:
                 channel = read(Channel, content, whole)
-                self.channels.setdefault(channel.id, channel)
+                if channel is not None:
+                    self.channels.setdefault(channel.id, channel)
 
 
 def read(kind: Any, data: Data, found: Found) -> Any:
-    """Return a record of a kind of `mcap.records`."""
-    return kind.read(ReadDataStream(BytesIO(data[found.begin + mcap_scan.HEAD.size : found.end])))
+    """Return a record of a kind of `mcap.records`, or None if its lengths lead out of it or its text is none."""
+    try:
+        return kind.read(ReadDataStream(BytesIO(data[found.begin + mcap_scan.HEAD.size : found.end])))
+    except DAMAGES:
+        return None
 
 
 def _write(sources: Sequence[_Source], output: Path, advance: Advance) -> None:
