@@ -126,7 +126,8 @@ class _Reader:
             parent = child
 
     def _upper_body(self, links: list[Link], joints: list[Joint]) -> None:
-        for name, entry in _get(self.data, "upper_body", "the file", dict).items():
+        for key, entry in _get(self.data, "upper_body", "the file", dict).items():
+            name = str(key)
             com = _vector(entry, "com", f"upper_body, {name}")
             joints.append(Joint(f"{name}_mount", BASE_LINK, name, com))
             links.append(_solid(name, entry, com, f"upper_body, {name}"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -21,7 +22,7 @@ VERSION = 1
 LARGEST = 2**24  # [B] of its arrays; a situation takes some kilobytes
 DAMAGES = (
     *(OSError, ValueError, LookupError, TypeError, EOFError, OverflowError, MemoryError, RuntimeError),
-    *(zipfile.BadZipFile, zlib.error),
+    *(zipfile.BadZipFile, zlib.error, tokenize.TokenError),
 )
 """What NumPy and the library of .npz files raise on meeting something else."""
 APART = (
@@ -138,7 +139,8 @@ def load(path: Path, owner: Mapping[str, object], shape: tuple[int, ...]) -> dic
             if version != VERSION:
                 raise LearningFileError(f"it is of version {version}; expected {VERSION}")
             theirs = json.loads(str(file["owner"]))
-            keys, memories, baselines = file["keys"], file["memories"], file["baselines"]
+            # A member that is no array comes as bytes.
+            keys, memories, baselines = (np.asarray(file[name]) for name in ("keys", "memories", "baselines"))
     except FileNotFoundError:
         raise
     except DAMAGES as error:

@@ -12,6 +12,7 @@ from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 
 from tulip_ros.decompression import COMPRESSIONS, LARGEST, beginning, unpacked
+from tulip_ros.log_chunks import LATEST
 
 HEAD = struct.Struct("<BQ")  # opcode, length
 CHUNK = struct.Struct("<QQQI")  # first and last log time, size and checksum of what it holds
@@ -150,6 +151,14 @@ def records(content: bytes) -> Iterator[tuple[int, int, int]]:
             return
         yield opcode, place, place + length
         place += length
+
+
+def message_head(content: bytes, begin: int, end: int) -> tuple[int, int, int, int] | None:
+    """Return channel, sequence, log and publish time [ns] of a message; None if it is too short, or of no possible time."""
+    if end - begin < MESSAGE.size:
+        return None
+    channel, sequence, log_time, published = MESSAGE.unpack_from(content, begin)
+    return None if max(log_time, published) > LATEST else (channel, sequence, log_time, published)
 
 
 def _next(data: Data, begin: int) -> int:

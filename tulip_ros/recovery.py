@@ -212,7 +212,7 @@ class _Source:
             whole = Found(opcode, begin - mcap_scan.HEAD.size, end)
             if opcode == Opcode.SCHEMA:
                 schema = read(Schema, content, whole)
-                if schema is not None:
+                if schema is not None and _is_text(schema.data):
                     self.schemas.setdefault(schema.id, schema)
             elif opcode == Opcode.CHANNEL:
                 channel = read(Channel, content, whole)
@@ -313,12 +313,21 @@ def _copy_chunk(source: _Source, found: Found, file: McapFile) -> None:
             file.add_chunk(chunk)
         return
     indices: dict[int, array[int]] = {}
-    for opcode, begin, _ in mcap_scan.records(content):
+    numbers: list[tuple[int, int]] = []
+    sound, place = True, 0
+    for opcode, begin, end in mcap_scan.records(content):
+        place = end
         if opcode == Opcode.MESSAGE:
-            channel, sequence, log_time, _ = mcap_scan.MESSAGE.unpack_from(content, begin)
+            message = mcap_scan.message_head(content, begin, end)
+            if message is None:
+                sound = False
+                continue
+            channel, sequence, log_time, _ = message
             indices.setdefault(channel, array("Q")).extend((log_time, begin - mcap_scan.HEAD.size))
+            numbers.append((channel, sequence))
+    if sound and place == len(content) and all(map(source.channel_is_known, indices)):
+        for channel, sequence in numbers:
             source.see(channel, sequence)
-    if all(map(source.channel_is_known, indices)):
         held = bytes(source.data[head.data : head.data + head.length])
         file.add_compressed(held, head.compression, head.span, head.size, head.checksum, indices)
         return
@@ -331,15 +340,24 @@ def _copy_chunk(source: _Source, found: Found, file: McapFile) -> None:
 def _take(source: _Source, content: bytes, chunk: Chunk) -> None:
     """Put all messages that can be read into a chunk."""
     for opcode, begin, end in mcap_scan.records(content):
-        if opcode != Opcode.MESSAGE or end - begin < mcap_scan.MESSAGE.size:
+        message = mcap_scan.message_head(content, begin, end) if opcode == Opcode.MESSAGE else None
+        if message is None:
             continue
-        channel, sequence, log_time, publish_time = mcap_scan.MESSAGE.unpack_from(content, begin)
+        channel, sequence, log_time, publish_time = message
         if source.channel_is_known(channel):
             chunk.add(channel, sequence, log_time, publish_time, content[begin + mcap_scan.MESSAGE.size : end])
             source.see(channel, sequence)
         else:
             topic = f"channel {channel}, whose topic and type are lost"
             source.saved.lost[topic] = source.saved.lost.get(topic, 0) + 1
+
+
+def _is_text(data: bytes) -> bool:
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def _beside(path: Path) -> Path:

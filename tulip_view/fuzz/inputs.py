@@ -6,7 +6,11 @@ A reader takes an input or raises one of its errors. Whatever else it raises is 
 
 from __future__ import annotations
 
+import io
 import random
+import struct
+import zipfile
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -261,8 +265,11 @@ def damaged_recording(data: bytes, folder: Path) -> str:
     if path.read_bytes() != data:
         raise WrongError("a recording was changed by being mended")
     if output is not None:
-        with Log(output) as log:
-            rhythms(log, lambda count: None)
+        try:
+            with Log(output) as log:
+                rhythms(log, lambda count: None)
+        except BadInputError as error:
+            raise WrongError(f"a recording is damaged after it was mended: {error}") from error
     return ""
 
 
@@ -372,6 +379,22 @@ def _message_like(rng: random.Random) -> bytes:
     return damaged(rng, [each for found in samples.messages().values() for each in found])
 
 
+def _learning_like(rng: random.Random) -> bytes:
+    """Return a learning file that is damaged, or whose arrays are, in an archive that is sound."""
+    data = damaged(rng, samples.learning_files()) if rng.random() < 0.3 else rng.choice(samples.learning_files())
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            held = {name: archive.read(name) for name in archive.namelist()}
+    except (zipfile.BadZipFile, ValueError, OSError, RuntimeError, EOFError, zlib.error, struct.error):
+        return data
+    name, written = rng.choice(sorted(held)), io.BytesIO()
+    held[name] = damaged(rng, list(held.values()) if rng.random() < 0.1 else [held[name]])
+    with zipfile.ZipFile(written, "w", rng.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED))) as archive:
+        for each, content in held.items():
+            archive.writestr(each, content)
+    return written.getvalue()
+
+
 def _yaml(name: str, read: Read, error: type[Exception], found: Callable[[], Sequence[bytes]]) -> Kind:
     return Kind(name, _text_like(found), read, (error,), samples=found)
 
@@ -403,7 +426,7 @@ KINDS = (
     _yaml("files of calibration pictures", shots_file, RecordingError, samples.shots_file),
     Kind(
         "learning files (.npz)",
-        _bytes_like(samples.learning_files),
+        _learning_like,
         learning_file,
         (LearningFileError,),
         samples=samples.learning_files,

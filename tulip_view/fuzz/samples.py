@@ -49,7 +49,7 @@ PICTURE = (24, 32)  # [px] height and width
 ELSEWHERE = "pkg/msg/Odd"
 """A type that is not installed: only the recording knows what it is."""
 ODD = (
-    "std_msgs/Header header\nfloat64[] values\nstring<=20 name\nInner[] rows\nuint8[3] three\nwstring[<=2] wide\n"
+    "std_msgs/Header header\nfloat64[] values\nstring<=20 name\nInner[] rows\nuint8[3] three\n"
     + schemas.SEPARATOR
     + "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
     + schemas.SEPARATOR
@@ -137,10 +137,10 @@ def shots_file() -> tuple[bytes, ...]:
 def parameter_files() -> tuple[bytes, ...]:
     """Return files of parameters in both forms."""
     return (
-        b"vision: {segmentation: {light_rate: 0.1}, opponents.team_colour: cyan}\nhead:\n  max_speed: 2.0\n"
-        b"strategy: {team: 1}\nmotion: {gait: dcm, step_time: 0.4}\n",
+        b"vision: {segmentation: {brightness_step: 0.1}, opponents.team_colour: cyan}\nhead:\n  acceleration: 2.0\n"
+        b"strategy: {field_turned: true}\nmotion: {gait: dcm, step_time: 0.4}\n",
         b"/**:\n  ros__parameters: {use_sim_time: true}\n/striker/head:\n  ros__parameters:\n"
-        b"    pan_limits: [-1.5, 1.5]\n    max_speed: 2\ngame_input:\n  team_number: 25\n  team_colour: cyan\n",
+        b"    acceleration: 2\n    damping: 1e0\nmotion: {walk_gains: [1, 2]}\ngame_input:\n  team_number: 25\n  team_colour: cyan\n",
     )
 
 
