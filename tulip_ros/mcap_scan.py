@@ -154,7 +154,7 @@ def records(content: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def message_head(content: bytes, begin: int, end: int) -> tuple[int, int, int, int] | None:
-    """Return channel, sequence, log and publish time [ns] of a message; None if it is too short, or of no possible time."""
+    """Return channel, sequence, log and publish time [ns] of a message; None if too short or of no possible time."""
     if end - begin < MESSAGE.size:
         return None
     channel, sequence, log_time, published = MESSAGE.unpack_from(content, begin)

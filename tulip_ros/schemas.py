@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 PRIMITIVE = re.compile(r"(bool|byte|char|float32|float64|u?int(8|16|32|64)|w?string)(<=\d+)?$")
-NAME = re.compile(r"([a-z][a-z0-9_]*)/(msg|srv|action)/([A-Z][A-Za-z0-9_]*)")
+NAME = re.compile(r"([a-z][a-z0-9_]{0,99})/(msg|srv|action)/([A-Z][A-Za-z0-9_]{0,99})")
 """What a type can be called. Names come from recordings and from the graph: no other is looked for."""
 ARRAY = re.compile(r"\[[^\]]*\]$")
 SEPARATOR = "=" * 80 + "\n"
@@ -28,6 +28,7 @@ def message_class(type_name: str) -> type[Any]:
         LookupError: if the type is not installed.
     """
     package, kind, name = _parts(type_name)
+    _text(type_name)  # a module of another kind is not even imported
     try:
         return getattr(importlib.import_module(f"{package}.{kind}"), name)
     except (ImportError, AttributeError) as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import multiprocessing
 import os
 import random
@@ -113,27 +112,29 @@ def run(kind: Kind, count: int) -> Result:
     whole, first = Result(), 0
     context = multiprocessing.get_context("fork")
     current = context.Value("q", 0, lock=False)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
         while first < count:
             ours, theirs = context.Pipe(duplex=False)
-            child = context.Process(target=_child, args=(kind, first, count, Path(folder), theirs, current))
+            child = context.Process(target=_child, args=(kind, first, count, folder, theirs, current))
             child.start()
             theirs.close()
-            with contextlib.suppress(EOFError):
+            try:
                 while first < count and ours.poll(DEAD):
                     result, first = ours.recv()
                     whole.see(result)
-            if first < count:  # it died, or hangs
-                died = child.exitcode is not None or not child.is_alive()
-                child.kill()
+            except EOFError:  # it died
                 child.join()
+            hangs = first < count and child.is_alive()
+            if hangs:
+                child.kill()
+            child.join()
+            if first < count:
                 # What it read since its last report is read anew, but for the input that ended it.
                 for number in range(first, current.value):
-                    read(kind, number, made(kind, number), _emptied(folder), whole)
-                whole.fail(current.value, f"process ended ({child.exitcode})" if died else "hang beyond signals")
+                    read(kind, number, made(kind, number), _place(folder), whole)
+                whole.fail(current.value, "hang beyond signals" if hangs else f"process ended ({child.exitcode})")
                 first = current.value + 1
-            else:
-                child.join()
     return whole
 
 
@@ -154,7 +155,7 @@ def _child(kind: Kind, first: int, count: int, folder: Path, connection: Connect
         data = made(kind, number)
         signal.setitimer(signal.ITIMER_PROF, LONGEST)
         try:
-            read(kind, number, data, _emptied(str(folder)), result)
+            read(kind, number, data, _place(folder), result)
             signal.setitimer(signal.ITIMER_PROF, 0.0)
         except HangError:  # just when it was read
             pass
@@ -165,8 +166,8 @@ def _child(kind: Kind, first: int, count: int, folder: Path, connection: Connect
     os._exit(0)
 
 
-def _emptied(folder: str) -> Path:
-    path = Path(folder) / "input"
+def _place(folder: Path) -> Path:
+    path = folder / "input"
     path.mkdir(exist_ok=True)
     return path
 

@@ -54,6 +54,7 @@ from tulip_view.fuzz.mutation import damaged, damaged_text
 from tulip_view.recording import choose_robot
 from tulip_view.recording import read as read_tracks
 from tulip_view.report.build import WANTED, make_report
+from tulip_view.report.page import make_page
 from tulip_view.tables import make_table, regular_times, sources_of
 from tulip_vision.calibration.recording import FILE as SHOTS
 from tulip_vision.calibration.recording import RecordingError, read_recording
@@ -218,7 +219,7 @@ def parameter_file(data: bytes, folder: Path) -> str:
         values = {**flattened(given.get(EVERY_NODE, {})), **flattened(given.get(name, {}))}
         own = {key: value for key, value in values.items() if key not in parameters.ROS_NAMES}
         found = parameters.plain(parameters.replace(defaults, own, name))
-        wrong = [key for key, value in found.items() if isinstance(value, float) and np.isnan(value)]
+        wrong = [key for key, value in found.items() if isinstance(value, float | list) and np.isnan(value).any()]
         if wrong:
             raise WrongError(f"parameter {wrong[0]} of {name} was taken as NaN")
     return ""
@@ -285,7 +286,7 @@ def table(data: bytes, folder: Path) -> str:
 def report(data: bytes, folder: Path) -> str:
     """Make a report of a recording, as report.py does."""
     with Log(_file(folder, "a.mcap", data)) as log:
-        make_report(log, choose_robot(log, None), lambda count: None)
+        make_page(make_report(log, choose_robot(log, None), lambda count: None))
     return ""
 
 
@@ -356,6 +357,7 @@ def _defaults() -> dict[str, object]:
         "strategy": StrategyNodeParameters(),
         "worldmodel": WorldModelNodeParameters(),
         "game_input": GameInputParameters(),
+        "user_input": UserInputParameters(),
     }
 
 

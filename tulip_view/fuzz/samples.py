@@ -137,10 +137,11 @@ def shots_file() -> tuple[bytes, ...]:
 def parameter_files() -> tuple[bytes, ...]:
     """Return files of parameters in both forms."""
     return (
-        b"vision: {segmentation: {brightness_step: 0.1}, opponents.team_colour: cyan}\nhead:\n  acceleration: 2.0\n"
+        b"vision: {segmentation: {brightness_step: 1.5}, opponents.team_colour: cyan}\nhead:\n  acceleration: 2.0\n"
         b"strategy: {field_turned: true}\nmotion: {gait: dcm, step_time: 0.4}\n",
         b"/**:\n  ros__parameters: {use_sim_time: true}\n/striker/head:\n  ros__parameters:\n"
-        b"    acceleration: 2\n    damping: 1e0\nmotion: {walk_gains: [1, 2]}\ngame_input:\n  team_number: 25\n  team_colour: cyan\n",
+        b"    acceleration: 2\n    damping: 1e0\n"
+        b"user_input: {walk_test_limits: [0.5, 0.2, 1]}\ngame_input:\n  team_number: 25\n  team_colour: cyan\n",
     )
 
 
