@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-import cv2
 import numpy as np
 import typer
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
+from tulip_vision.coded_picture import decode_picture
 
 Picture = NDArray[np.uint8]
 P = ParamSpec("P")
@@ -50,13 +50,11 @@ def make_folder(folder: Path) -> None:
 def read_picture(path: Path) -> Picture:
     """Return a picture, (height, width, 3) BGR."""
     try:
-        content = np.frombuffer(path.read_bytes(), np.uint8)
+        return decode_picture(path.read_bytes())
     except OSError as error:
         raise BadInputError(f"Picture {path} cannot be read: {error.strerror}.") from error
-    picture = cv2.imdecode(content, cv2.IMREAD_COLOR) if content.size else None
-    if picture is None:
-        raise BadInputError(f"Picture {path} is none that can be read; expected PNG, JPEG or the like.")
-    return np.asarray(picture, np.uint8)
+    except ValueError as error:
+        raise BadInputError(f"Picture {path} is none that can be read: {error}.") from error
 
 
 def read_pictures(paths: list[Path]) -> dict[str, Picture]:

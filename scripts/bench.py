@@ -47,10 +47,11 @@ from tulip_sim.bench import (
     walk,
 )
 from tulip_sim.bench.runner import Row, run, save, write_results
+from tulip_view.fuzz import bench as fuzz
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress, engines),
-    *(simcheck, vision, localization, ball, head, latency, log, faces, identify, dynamics),
+    *(simcheck, vision, localization, ball, head, latency, log, faces, identify, dynamics, fuzz),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"

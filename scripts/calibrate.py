@@ -15,7 +15,6 @@ from typing import Annotated
 import cv2
 import numpy as np
 import typer
-import yaml
 from _calibration_io import Picture, make_folder, progress_bar, read_picture, read_pictures, told, track
 from rich.console import Console
 from rich.table import Table
@@ -24,6 +23,7 @@ from tulip_description.camera_mount import MOUNT_FILE, OFFSETS, MountOffsets, lo
 from tulip_description.field import load_field
 from tulip_description.planar import Pose2D
 from tulip_description.robot import load_robot
+from tulip_description.yaml_file import read_yaml
 from tulip_ros.errors import BadInputError, check_writable, unknown
 from tulip_vision.calibration.board_pictures import BoardCamera, PictureParameters, spots
 from tulip_vision.calibration.boards import CHARUCO, CHESSBOARD, Board, Corners
@@ -354,18 +354,15 @@ def read_labels(
         found.setdefault(names[number - 1], {}).setdefault(match[1], []).append(spot)
     if file is not None:
         try:
-            content = yaml.safe_load(file.read_text())
+            content = read_yaml(file, ValueError)
             for name, classes in content.items():
                 matching = [each for each in names if each == name or Path(each).name == name] or [str(name)]
                 for colour, spots in classes.items():
                     into = found.setdefault(matching[0], {}).setdefault(str(colour), [])
                     into += [(int(x), int(y), int(w), int(h)) for x, y, w, h in spots]
-        except OSError as error:
-            raise BadInputError(f"--labels {file} cannot be read: {error.strerror}.") from error
-        except (yaml.YAMLError, UnicodeDecodeError, AttributeError, TypeError, ValueError) as error:
-            reason = " ".join(str(error).split())
+        except (AttributeError, TypeError, ValueError, OverflowError) as error:
             raise BadInputError(
-                f"--labels {file} is not as expected, picture: {{class: [[x, y, w, h], ...]}}: {reason}."
+                f"--labels {file} is not as expected, picture: {{class: [[x, y, w, h], ...]}}: {error}."
             ) from error
     return found
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -125,7 +126,8 @@ class _Reader:
             parent = child
 
     def _upper_body(self, links: list[Link], joints: list[Joint]) -> None:
-        for name, entry in _get(self.data, "upper_body", "the file", dict).items():
+        for key, entry in _get(self.data, "upper_body", "the file", dict).items():
+            name = str(key)
             com = _vector(entry, "com", f"upper_body, {name}")
             joints.append(Joint(f"{name}_mount", BASE_LINK, name, com))
             links.append(_solid(name, entry, com, f"upper_body, {name}"))
@@ -232,7 +234,8 @@ def _numbers(entry: Mapping[str, Any], key: str, where: str, count: int) -> list
         raise _BadValueError(f"{where}: {key} is missing")
     value = entry[key]
     values = value if isinstance(value, list) else [value]
-    if len(values) != count or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
+    good = all(isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v) for v in values)
+    if len(values) != count or not good:
         raise _BadValueError(
             f"{where}: {key} is {value!r}; expected {'a number' if count == 1 else f'{count} numbers'}"
         )

@@ -8,20 +8,33 @@ from typing import Any
 
 import yaml
 
+from tulip_description.yaml_text import LARGEST, load_yaml
+
 
 def read_yaml(path: Path, error: type[ValueError]) -> Any:
     """Return the content of a YAML file.
 
     Args:
         path: The file.
-        error: What is raised if it cannot be read or is not YAML; the message says which, in one line.
+        error: What is raised if it cannot be read or is no YAML that `load_yaml` takes; the message says which, in
+            one line.
     """
     try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
+        return load_yaml(read_start(path).decode())
     except OSError as reason:
         raise error(f"{path} cannot be read: {reason.strerror}") from reason
     except (yaml.YAMLError, UnicodeDecodeError) as reason:
         raise error(f"{path} is not YAML: {' '.join(str(reason).split())}") from reason
+
+
+def read_start(path: Path) -> bytes:
+    """Return the content of a YAML file, but no more of it than shows that it is too large.
+
+    Raises:
+        OSError: if it cannot be read.
+    """
+    with open(path, "rb") as stream:
+        return stream.read(LARGEST + 1)
 
 
 def write_lines(path: Path, lines: Iterable[str]) -> None:

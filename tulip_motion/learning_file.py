@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import tokenize
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -17,6 +19,12 @@ from tulip_motion.parameters import MotionParameters
 from tulip_motion.step_learning import Key, Situation, StepLearner
 
 VERSION = 1
+LARGEST = 2**24  # [B] of its arrays; a situation takes some kilobytes
+DAMAGES = (
+    *(OSError, ValueError, LookupError, TypeError, EOFError, OverflowError, MemoryError, RuntimeError),
+    *(zipfile.BadZipFile, zlib.error, tokenize.TokenError),
+)
+"""What NumPy and the library of .npz files raise on meeting something else."""
 APART = (
     *("kick_", "max_kick_", "side_kick_", "max_side_kick_", "walking_kick_", "max_walking_kick_", "ball_radius"),
     *("body_file", "learning_", "odometry_", "limp_", "fall_", "upright_"),
@@ -122,22 +130,29 @@ def load(path: Path, owner: Mapping[str, object], shape: tuple[int, ...]) -> dic
         LearningFileError: if it is damaged, of another version, or belongs to another robot or other parameters.
     """
     try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(each.file_size for each in archive.infolist())
+            if size > LARGEST:
+                raise LearningFileError(f"it holds {size} bytes; expected at most {LARGEST}")
         with np.load(path, allow_pickle=False) as file:
             version = int(file["version"])
             if version != VERSION:
                 raise LearningFileError(f"it is of version {version}; expected {VERSION}")
             theirs = json.loads(str(file["owner"]))
-            keys, memories, baselines = file["keys"], file["memories"], file["baselines"]
+            # A member that is no array comes as bytes.
+            keys, memories, baselines = (np.asarray(file[name]) for name in ("keys", "memories", "baselines"))
     except FileNotFoundError:
         raise
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except DAMAGES as error:
         raise LearningFileError(f"it is damaged or no .npz file ({type(error).__name__})") from error
     _check_owner(theirs, owner)
-    count = len(keys)
-    expected = {"keys": (count, 3), "memories": (count, *shape), "baselines": (count, 2)}
-    for (name, wanted), array in zip(expected.items(), (keys, memories, baselines), strict=True):
-        if array.shape != wanted and count:
-            raise LearningFileError(f"its {name} have shape {array.shape}; expected {wanted}")
+    count = keys.shape[0] if keys.ndim else 0
+    if count == 0:
+        return {}
+    expected = {"keys": ((count, 3), "i"), "memories": ((count, *shape), "f"), "baselines": ((count, 2), "f")}
+    for (name, (wanted, kind)), array in zip(expected.items(), (keys, memories, baselines), strict=True):
+        if array.shape != wanted or array.dtype.kind != kind:
+            raise LearningFileError(f"its {name} are {array.shape} of {array.dtype}; expected {wanted} numbers")
         if not np.isfinite(array).all() or (name == "baselines" and (array < 0.0).any()):
             raise LearningFileError(f"its {name} are not all finite and in range")
     return {

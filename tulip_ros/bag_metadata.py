@@ -10,6 +10,7 @@ from typing import Any
 
 import yaml
 
+from tulip_description.yaml_text import load_yaml
 from tulip_ros.topics import Quality
 
 NAME = "metadata.yaml"
@@ -63,7 +64,7 @@ def write(
                     "name": topic.name,
                     "type": topic.type_name,
                     "serialization_format": "cdr",
-                    "offered_qos_profiles": yaml.safe_load(topic.quality) or [],
+                    "offered_qos_profiles": profiles_of(topic.quality),
                     "type_description_hash": "",
                 },
                 "message_count": topic.messages,
@@ -99,6 +100,15 @@ def quality_profiles(quality: Quality) -> str:
         "avoid_ros_namespace_conventions": False,
     }
     return yaml.safe_dump([profile], sort_keys=False)
+
+
+def profiles_of(quality: str) -> list[Any]:
+    """Return the profiles of a quality of service as a recording notes it; none of one that is no such YAML."""
+    try:
+        found = load_yaml(quality)
+    except yaml.YAMLError:
+        return []
+    return found if isinstance(found, list) else []
 
 
 def _times(entry: FileEntry) -> dict[str, Any]:

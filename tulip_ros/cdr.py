@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from struct import Struct
+from struct import Struct, error
 
 from tulip_ros import schemas
 
@@ -40,14 +40,11 @@ def without_gaps(type_name: str, data: bytes) -> bytes:
         LookupError: if the type is not installed, or holds what is not known here (wide strings, long doubles).
         ValueError: if the data end too early.
     """
-    cleared = bytearray(data)
-    number = _LITTLE if data[1] & 1 else _BIG
+    steps, cleared = steps_of(type_name), bytearray(data)
     try:
-        end = _clear(steps_of(type_name), data, cleared, 0, number)
-    except Exception as error:
-        if isinstance(error, LookupError):
-            raise
-        raise ValueError(f"{len(data)} bytes are no {type_name}: {error}") from error
+        end = _clear(steps, data, cleared, 0, _LITTLE if data[1] & 1 else _BIG)
+    except (error, IndexError):
+        raise ValueError(f"{len(data)} bytes are no {type_name}: they end too early") from None
     if end + HEAD > len(data):
         raise ValueError(f"{len(data)} bytes are no {type_name}; expected at least {end + HEAD}")
     return bytes(cleared[: end + HEAD])
@@ -59,10 +56,7 @@ _LITTLE, _BIG = Struct("<I"), Struct(">I")
 def _clear(steps: tuple[Step, ...], data: bytes, cleared: bytearray, place: int, number: Struct) -> int:
     """Clear the gaps from a place on and return where the message ends."""
     for kind, alignment, size, inner in steps:
-        gap = -place % alignment
-        if gap:
-            cleared[HEAD + place : HEAD + place + gap] = bytes(gap)
-            place += gap
+        place = _over_gap(cleared, place, alignment)
         if kind == FIXED:
             place += size
             continue
@@ -72,13 +66,24 @@ def _clear(steps: tuple[Step, ...], data: bytes, cleared: bytearray, place: int,
             place += count
         elif kind == NUMBERS:
             if count:
-                gap = -place % size
-                cleared[HEAD + place : HEAD + place + gap] = bytes(gap)
-                place += gap + count * size
+                place = _over_gap(cleared, place, size) + count * size
         else:
             for _ in range(count):
                 place = _clear(inner, data, cleared, place, number)
     return place
+
+
+def _over_gap(cleared: bytearray, place: int, alignment: int) -> int:
+    """Clear what lies before the next multiple of an alignment, and return that place.
+
+    Raises:
+        IndexError: if it lies behind the end: a count that is damaged would lead on and on.
+    """
+    end = place + -place % alignment
+    if HEAD + end > len(cleared):
+        raise IndexError(f"byte {end} lies behind the end")
+    cleared[HEAD + place : HEAD + end] = bytes(end - place)
+    return end
 
 
 @cache

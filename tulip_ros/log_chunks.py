@@ -10,17 +10,18 @@ import struct
 from collections.abc import Collection, Iterator
 from typing import BinaryIO
 
-import lz4.frame
-import zstandard
-from isal.isal_zlib import crc32
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Chunk, ChunkIndex
 from mcap.summary import Summary
 
+from tulip_ros.decompression import unpacked
+
 RECORD = struct.Struct("<BQ")  # opcode and length
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+LATEST = 2**63 - 1  # [ns] in the year 2262; a later time is a damaged number
+HELD = 2**30  # [B] of messages of chunks whose times overlap, which wait for their turn
 
 Message = tuple[int, int, int, int, bytes]
 """Channel, sequence, log time, publish time [ns] and serialized data."""
@@ -39,7 +40,7 @@ def messages_of(
         end: First log time not wanted any more [ns], or None.
 
     Raises:
-        McapError: if a chunk is damaged.
+        McapError: if a chunk is damaged, or more than HELD would have to wait.
         ValueError: if its data are.
     """
     indexes = sorted(
@@ -47,17 +48,22 @@ def messages_of(
         key=lambda index: (index.message_start_time, index.chunk_start_offset),
     )
     waiting: list[tuple[int, int, int, Message]] = []  # log time, chunk, place, message
+    held = 0
     for number, index in enumerate(indexes):
         for place, message in _wanted(_content(stream, index), channels):
             time = message[2]
             if (start is None or time >= start) and (end is None or time < end):
                 waiting.append((time, index.chunk_start_offset, place, message))
+                held += len(message[4])
+        if held > HELD:
+            raise McapError(f"the times of its chunks overlap, by more than {HELD} bytes of messages")
         waiting.sort()
         later = indexes[number + 1].message_start_time if number + 1 < len(indexes) else None
         ready = 0
         while ready < len(waiting) and (later is None or waiting[ready][0] < later):
             ready += 1
         for entry in waiting[:ready]:
+            held -= len(entry[3][4])
             yield entry[3]
         del waiting[:ready]
 
@@ -71,38 +77,31 @@ def _may_hold(index: ChunkIndex, channels: Collection[int], start: int | None, e
 
 def _content(stream: BinaryIO, index: ChunkIndex) -> bytes:
     """Return the records of a chunk."""
-    stream.seek(index.chunk_start_offset + RECORD.size)
+    stream.seek(index.chunk_start_offset)
+    opcode, length = RECORD.unpack(stream.read(RECORD.size))
+    if opcode != Opcode.CHUNK or length + RECORD.size != index.chunk_length:
+        raise McapError(f"there is no chunk at byte {index.chunk_start_offset}, where the index has one")
     chunk = Chunk.read(ReadDataStream(stream))
-    size = chunk.uncompressed_size
     try:
-        if chunk.compression == "zstd":
-            data = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
-        elif chunk.compression == "lz4":
-            data = lz4.frame.decompress(chunk.data)
-        elif chunk.compression == "":
-            data = chunk.data
-        else:
-            raise McapError(f"compression {chunk.compression!r} is not known; expected zstd, lz4 or none")
-    except (zstandard.ZstdError, RuntimeError) as error:
-        raise McapError(f"a chunk cannot be decompressed: {error}") from error
-    if chunk.uncompressed_crc and crc32(data) != chunk.uncompressed_crc:
-        raise McapError(f"the chunk at byte {index.chunk_start_offset} has another checksum than it should")
-    return bytes(data)
+        return unpacked(chunk.data, chunk.compression, chunk.uncompressed_size, chunk.uncompressed_crc)
+    except ValueError as error:
+        raise McapError(f"byte {index.chunk_start_offset}: {error}") from error
 
 
 def _wanted(data: bytes, channels: Collection[int]) -> Iterator[tuple[int, Message]]:
     """Yield the messages of some channels in a chunk, each with its place in it."""
     place, size = 0, len(data)
-    try:
-        while place < size:
-            opcode, length = RECORD.unpack_from(data, place)
-            body = place + RECORD.size
-            if opcode == Opcode.MESSAGE:
-                channel, sequence, log_time, published = MESSAGE.unpack_from(data, body)
-                if channel in channels:
-                    yield place, (channel, sequence, log_time, published, data[body + MESSAGE.size : body + length])
-            place = body + length
-    except struct.error as error:
-        raise McapError(f"a chunk ends in the middle of a record: {error}") from error
-    if place != size:
-        raise McapError("a chunk ends in the middle of a record")
+    while place < size:
+        body = place + RECORD.size
+        opcode, length = RECORD.unpack_from(data, place) if body <= size else (0, size)
+        if body + length > size:
+            raise McapError("a chunk ends in the middle of a record")
+        if opcode == Opcode.MESSAGE:
+            if length < MESSAGE.size:
+                raise McapError(f"a message is {length} bytes long; expected at least {MESSAGE.size}")
+            channel, sequence, log_time, published = MESSAGE.unpack_from(data, body)
+            if log_time > LATEST or published > LATEST:
+                raise McapError(f"a message is of {max(log_time, published)} ns; expected at most {LATEST} ns")
+            if channel in channels:
+                yield place, (channel, sequence, log_time, published, data[body + MESSAGE.size : body + length])
+        place = body + length

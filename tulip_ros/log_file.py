@@ -2,48 +2,28 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO
+from typing import Any
 
-import yaml
-from mcap.exceptions import McapError
-from mcap.reader import SeekingReader
 from mcap.records import Attachment, Schema
-from mcap.summary import Summary
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import deserialize_message
-from zstandard import ZstdError
 
+from tulip_description.yaml_file import read_yaml
 from tulip_ros import schemas
 from tulip_ros.errors import BadInputError
 from tulip_ros.log_chunks import messages_of
+from tulip_ros.log_index import IndexedFile, damages_of
 
-MAGIC = b"\x89MCAP0\r\n"
-SHORTEST = 2 * len(MAGIC) + 29  # [B] with its end
 ENCODINGS = ("cdr",)
-DAMAGES = (McapError, ZstdError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, struct.error)
-"""What the reader raises on meeting damaged bytes."""
 REPEATED = "repeated"
 """Note in a file that continues a recording: of which topics it begins with messages of the file before, and the
 sequence numbers of the first and the last of them, as in "3 3"."""
-
-
-class DamagedLogError(BadInputError):
-    """A recording that was not ended as it should be, or is damaged; `scripts/recover.py` mends it."""
-
-    def __init__(self, path: Path, what: str) -> None:
-        super().__init__(f"Recording {path} {what}. Mend it first: python3 scripts/recover.py {path}")
-        self.path, self._what = path, what
-
-    def __reduce__(self) -> tuple[type[DamagedLogError], tuple[Path, str]]:
-        """Go from one process to another."""
-        return DamagedLogError, (self.path, self._what)
 
 
 @dataclass(frozen=True)
@@ -107,11 +87,10 @@ class Log:
         self.files = files_of(path)
         self._decoders: dict[str, Any] = {}
         self._open = ExitStack()
-        self._readers: list[tuple[SeekingReader, Summary]] = []
-        self._streams: list[BinaryIO] = []
+        self._files: list[IndexedFile] = []
         try:
             for file in self.files:
-                self._readers.append(self._open_file(file))
+                self._files.append(self._open.enter_context(IndexedFile(file)))
         except BaseException:
             self._open.close()
             raise
@@ -132,46 +111,59 @@ class Log:
 
     @cached_property
     def topics(self) -> dict[str, LoggedTopic]:
-        """Topics by their names, in the order of these."""
+        """Topics by their names, in the order of these.
+
+        Raises:
+            DamagedLogError: if a definition is damaged.
+        """
         counts: dict[str, int] = {}
         found: dict[str, Schema] = {}
         qualities: dict[str, str] = {}
-        for file, (_, summary) in enumerate(self._readers):
-            statistics = summary.statistics
+        for file, repeated in zip(self._files, self._repeated, strict=True):
+            summary, statistics = file.summary, file.summary.statistics
             for number, channel in summary.channels.items():
                 if channel.message_encoding not in ENCODINGS or channel.schema_id not in summary.schemas:
                     continue  # not written by ROS 2: nothing that could be decoded
                 found.setdefault(channel.topic, summary.schemas[channel.schema_id])
                 qualities.setdefault(channel.topic, channel.metadata.get("offered_qos_profiles", ""))
                 here = 0 if statistics is None else statistics.channel_message_counts.get(number, 0)
-                first, last = self._repeated[file].get(channel.topic, (0, -1))
+                first, last = repeated.get(channel.topic, (0, -1))
                 counts[channel.topic] = counts.get(channel.topic, 0) + max(0, here - (last + 1 - first))
-        return {
-            name: LoggedTopic(name, found[name].name, found[name].data.decode(), counts[name], qualities[name])
-            for name in sorted(found)
-        }
+        with damages_of(self.path):
+            return {
+                name: LoggedTopic(name, found[name].name, found[name].data.decode(), counts[name], qualities[name])
+                for name in sorted(found)
+            }
 
     @cached_property
     def span(self) -> tuple[int, int]:
         """Log times of the first and the last message [ns]; twice 0 without messages."""
         spans = [
             (statistics.message_start_time, statistics.message_end_time)
-            for _, summary in self._readers
-            if (statistics := summary.statistics) is not None and statistics.message_count
+            for file in self._files
+            if (statistics := file.summary.statistics) is not None and statistics.message_count
         ]
         return (min(first for first, _ in spans), max(last for _, last in spans)) if spans else (0, 0)
 
     @cached_property
     def metadata(self) -> dict[str, dict[str, str]]:
-        """What the recorder noted, by the name of the note."""
-        entries = [entry for reader, _ in self._readers for entry in reader.iter_metadata()]
+        """What the recorder noted, by the name of the note.
+
+        Raises:
+            DamagedLogError: if a note is damaged.
+        """
+        entries = [entry for file in self._files for entry in file.metadata()]
         return {entry.name: dict(entry.metadata) for entry in entries if entry.name != REPEATED}
 
     def attachments(self) -> Iterator[Attachment]:
-        """Yield the files that the recorder put in; what a later file repeats comes once."""
+        """Yield the files that the recorder put in; what a later file repeats comes once.
+
+        Raises:
+            DamagedLogError: if one is damaged.
+        """
         seen: set[tuple[str, bytes]] = set()
-        for reader, _ in self._readers:
-            for each in reader.iter_attachments():
+        for file in self._files:
+            for each in file.attachments():
                 if (each.name, each.data) not in seen:
                     seen.add((each.name, each.data))
                     yield each
@@ -190,19 +182,15 @@ class Log:
             DamagedLogError: if the file turns out to be damaged on the way.
         """
         wanted = self.topics if names is None else {name: self.topics[name] for name in names if name in self.topics}
-        for number, (file, stream, (_, summary)) in enumerate(
-            zip(self.files, self._streams, self._readers, strict=True)
-        ):
-            repeated = self._repeated[number]
+        for file, repeated in zip(self._files, self._repeated, strict=True):
+            summary = file.summary
             channels = {key: wanted[each.topic] for key, each in summary.channels.items() if each.topic in wanted}
-            try:
-                for channel, sequence, log_time, published, data in messages_of(stream, summary, channels, start, end):
+            with damages_of(file.path):
+                for channel, sequence, log_time, published, data in messages_of(file, summary, channels, start, end):
                     topic = channels[channel]
                     if topic.name in repeated and sequence <= repeated[topic.name][1]:
                         continue  # the file before had it
                     yield Record(topic, log_time, published, sequence, data)
-            except DAMAGES as error:
-                raise DamagedLogError(file, f"is damaged ({error})") from error
 
     def decode(self, record: Record) -> Any:
         """Return a message, by the definition that the recording itself holds.
@@ -213,9 +201,9 @@ class Log:
             BadInputError: if data and definition do not fit.
         """
         topic = record.topic
-        if topic.type_name not in self._decoders:
-            self._decoders[topic.type_name] = _decoder(topic)
         try:
+            if topic.type_name not in self._decoders:
+                self._decoders[topic.type_name] = _decoder(topic)
             return self._decoders[topic.type_name](record.data)
         except Exception as error:  # a decoder meets damaged data in many ways
             raise BadInputError(
@@ -226,35 +214,12 @@ class Log:
     def _repeated(self) -> list[dict[str, tuple[int, int]]]:
         """Numbers of the first and the last message that each file repeats from the one before, by topic."""
         found: list[dict[str, tuple[int, int]]] = []
-        for reader, _ in self._readers:
-            notes = [each.metadata for each in reader.iter_metadata() if each.name == REPEATED and found]
-            words = {topic: str(numbers).split() for note in notes for topic, numbers in note.items()}
-            found.append({topic: (int(each[0]), int(each[-1])) for topic, each in words.items()})
+        for file in self._files:
+            with damages_of(file.path):
+                notes = [each.metadata for each in file.metadata() if each.name == REPEATED and found]
+                words = {topic: str(numbers).split() for note in notes for topic, numbers in note.items()}
+                found.append({topic: (int(each[0]), int(each[-1])) for topic, each in words.items()})
         return found if len(found) > 1 else [{}]
-
-    def _open_file(self, file: Path) -> tuple[SeekingReader, Summary]:
-        try:
-            stream = self._open.enter_context(open(file, "rb"))
-            begin = stream.read(len(MAGIC))
-            stream.seek(0)
-            if not begin:
-                raise BadInputError(
-                    f"Recording {file} is empty: nothing was written before its recorder ended. Expected an MCAP file."
-                )
-            if begin != MAGIC:
-                raise BadInputError(f"{file} is no MCAP file; expected a recording of `record.py` or `match.py`.")
-            if file.stat().st_size < SHORTEST:
-                raise DamagedLogError(file, "is cut")
-            self._streams.append(stream)
-            reader = SeekingReader(stream, validate_crcs=True)
-            summary = reader.get_summary()
-        except OSError as error:
-            raise BadInputError(f"Recording {file} cannot be read: {error.strerror or error}.") from error
-        except (*DAMAGES, StopIteration) as error:
-            raise DamagedLogError(file, "was not ended properly, or is cut") from error
-        if summary is None or summary.statistics is None:
-            raise DamagedLogError(file, "has no index")
-        return reader, summary
 
 
 def files_of(path: Path) -> list[Path]:
@@ -270,12 +235,14 @@ def files_of(path: Path) -> list[Path]:
         return [path]
     if not path.is_dir():
         raise BadInputError(f"There is no recording {path}; expected a folder or an MCAP file.")
+    held = {file.name: file for file in path.iterdir() if file.is_file()}  # no name leads out of the folder
     try:
-        content = yaml.safe_load((path / "metadata.yaml").read_text())
-        named = [path / name for name in content["rosbag2_bagfile_information"]["relative_file_paths"]]
-    except (OSError, yaml.YAMLError, KeyError, TypeError):
+        content = read_yaml(path / "metadata.yaml", ValueError)
+        named = [str(name) for name in content["rosbag2_bagfile_information"]["relative_file_paths"]]
+    except (ValueError, KeyError, TypeError):
         named = []
-    found = [file for file in named if file.is_file()] or sorted(path.glob("*.mcap"), key=_age_in_name)
+    found = [held[name] for name in dict.fromkeys(named) if name in held]
+    found = found or sorted((file for file in held.values() if file.suffix == ".mcap"), key=_age_in_name)
     if not found:
         raise BadInputError(f"Folder {path} holds no recording; expected a file that ends in .mcap.")
     return found

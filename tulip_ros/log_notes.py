@@ -15,7 +15,9 @@ import yaml
 import tulip_description
 import tulip_motion
 import tulip_vision
+from tulip_description.yaml_text import load_yaml
 from tulip_ros import parameters
+from tulip_ros.errors import BadInputError
 from tulip_ros.log_file import Log
 
 RECORDING, LOST = "recording", "lost messages"
@@ -26,8 +28,6 @@ PACKAGES = (
     *("tulip-soccer", "ros-jazzy-rclpy", "ros-rmw-fastrtps-cpp", "mcap", "numpy", "scipy", "pin", "filterpy", "numba"),
     *("opencv-python-headless", "pybullet", "mujoco", "py_trees"),
 )
-LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-"""As safe as the other, and ten times as fast where its library is there."""
 FILES = (
     (tulip_description, ("robot.yaml", "field.yaml", "camera_mount.yaml")),
     (tulip_motion, ("gait.yaml",)),
@@ -120,12 +120,28 @@ def parameters_of(log: Log) -> dict[str, dict[str, Any]]:
     """Return the parameters that a recording's nodes had, by full name of the node without the first slash.
 
     A node that was started again with other values has the last ones.
+
+    Raises:
+        BadInputError: if the recording's files of parameters are no such YAML.
     """
     found: dict[str, dict[str, Any]] = {}
     for each in log.attachments():
         if each.name.startswith(PARAMETERS):
-            found.update(yaml.load(each.data, LOADER))
+            try:
+                content = load_yaml(each.data)
+            except yaml.YAMLError as error:
+                raise _unreadable(log, each.name, " ".join(str(error).split())) from error
+            if not isinstance(content, dict) or not all(isinstance(block, dict) for block in content.values()):
+                raise _unreadable(log, each.name, "it is no `node: {name: value}`")
+            found.update({str(node): block for node, block in content.items()})
     return found
+
+
+def _unreadable(log: Log, name: str, reason: str) -> BadInputError:
+    return BadInputError(
+        f"Recording {log.path} holds parameters {name} that cannot be read ({reason}); expected YAML, as record.py has"
+        " it."
+    )
 
 
 def _git(root: Path, *arguments: str) -> str:

@@ -8,16 +8,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from mmap import mmap
 
-import lz4.frame
-import zstandard
 from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
+
+from tulip_ros.decompression import COMPRESSIONS, LARGEST, beginning, unpacked
+from tulip_ros.log_chunks import LATEST
 
 HEAD = struct.Struct("<BQ")  # opcode, length
 CHUNK = struct.Struct("<QQQI")  # first and last log time, size and checksum of what it holds
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-COMPRESSIONS = (b"", b"zstd", b"lz4")
-LARGEST = 2**31  # [B] of a chunk's records: more is a damaged number
 STRONG = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA)
 """Records whose parts must agree with their length, so that garbage is not taken for one."""
 LENGTHS = {Opcode.DATA_END: 4, Opcode.FOOTER: 20, Opcode.SUMMARY_OFFSET: 17}
@@ -114,38 +113,32 @@ def chunk_head(data: Data, begin: int) -> ChunkHead | None:
     first, last, size, checksum = CHUNK.unpack_from(data, place)
     place += CHUNK.size
     (length,) = struct.unpack_from("<I", data, place)
-    name = bytes(data[place + 4 : place + 4 + length]) if length <= 4 else b"?"
+    name = bytes(data[place + 4 : place + 4 + length]).decode("latin-1") if length <= 4 else "?"
     place += 4 + length
     if name not in COMPRESSIONS or size > LARGEST or place + 8 > len(data):
         return None
     (held,) = struct.unpack_from("<Q", data, place)
-    return ChunkHead((first, last), size, checksum, name.decode(), place + 8, held)
+    return ChunkHead((first, last), size, checksum, name, place + 8, held)
 
 
 def chunk_content(data: Data, head: ChunkHead) -> bytes | None:
     """Return a chunk's records, or None if they are not what was written."""
-    held = bytes(data[head.data : head.data + head.length])
     try:
-        if head.compression == "zstd":
-            content = zstandard.ZstdDecompressor().decompress(held, max_output_size=head.size)
-        else:
-            content = lz4.frame.decompress(held) if head.compression == "lz4" else held
-    except (zstandard.ZstdError, RuntimeError, MemoryError):
+        return unpacked(_held(data, head), head.compression, head.size, head.checksum)
+    except ValueError:
         return None
-    if len(content) != head.size or (head.checksum and crc32(content) != head.checksum):
-        return None
-    return bytes(content)
 
 
 def cut_content(data: Data, head: ChunkHead) -> bytes:
     """Return the beginning of the records of a chunk that the end of the file cuts."""
-    held = bytes(data[head.data : head.data + head.length])
     try:
-        if head.compression == "zstd":
-            return bytes(zstandard.ZstdDecompressor().decompressobj().decompress(held))
-        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(held)) if head.compression == "lz4" else held
-    except (zstandard.ZstdError, RuntimeError, EOFError):
+        return beginning(_held(data, head), head.compression, head.size)
+    except ValueError:
         return b""
+
+
+def _held(data: Data, head: ChunkHead) -> bytes:
+    return bytes(data[head.data : head.data + head.length])
 
 
 def records(content: bytes) -> Iterator[tuple[int, int, int]]:
@@ -158,6 +151,14 @@ def records(content: bytes) -> Iterator[tuple[int, int, int]]:
             return
         yield opcode, place, place + length
         place += length
+
+
+def message_head(content: bytes, begin: int, end: int) -> tuple[int, int, int, int] | None:
+    """Return channel, sequence, log and publish time [ns] of a message; None if too short or of no possible time."""
+    if end - begin < MESSAGE.size:
+        return None
+    channel, sequence, log_time, published = MESSAGE.unpack_from(content, begin)
+    return None if max(log_time, published) > LATEST else (channel, sequence, log_time, published)
 
 
 def _next(data: Data, begin: int) -> int:

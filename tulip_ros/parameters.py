@@ -7,6 +7,7 @@ prefix ("gait.step_time"). Rows of equal length in a tuple of tuples become one 
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator, Mapping
 from enum import Enum
 from typing import Any, TypeVar
@@ -120,7 +121,7 @@ def _check(name: str, default: Any, value: Any) -> None:
     elif isinstance(default, int):
         fits, expected = isinstance(value, int) and not isinstance(value, bool), "an integer"
     elif isinstance(default, float):
-        fits, expected = isinstance(value, int | float) and not isinstance(value, bool), "a number"
+        fits, expected = _is_number(value), "a number"
     elif isinstance(default, str):
         fits, expected = isinstance(value, str), "text"
     elif isinstance(default, tuple | list | np.ndarray):
@@ -138,11 +139,16 @@ def _sequence_fits(default: Any, value: Any) -> tuple[bool, str]:
         return is_list, "a list"
     if isinstance(flat[0], str):
         return is_list and all(isinstance(item, str) for item in value), "a list of texts"
-    numbers = is_list and all(isinstance(item, int | float) and not isinstance(item, bool) for item in value)
+    numbers = is_list and all(map(_is_number, value))
     if _is_nested(default):
         width = len(default[0])
         return numbers and len(value) % width == 0, f"a flat list of numbers, {width} a row"
     return numbers, "a list of numbers"
+
+
+def _is_number(value: Any) -> bool:
+    # NaN passes nearly every check of a range, and then stays in whatever is computed from it.
+    return isinstance(value, int | float) and not isinstance(value, bool) and not math.isnan(value)
 
 
 def _is_nested(value: Any) -> bool:

@@ -11,6 +11,8 @@ from typing import Any
 
 import yaml
 
+from tulip_description.yaml_file import read_start
+from tulip_description.yaml_text import DEEPEST, load_yaml
 from tulip_ros.errors import BadInputError, unknown
 from tulip_ros.nodes import DRIVERS, NODES, ROBOT, NodeEntry, find_driver, find_node
 
@@ -19,15 +21,6 @@ EVERY_NODE = "/**"
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*")
 SIMULATED = frozenset({"sim", "match", "log"})
 """Drivers that publish /clock, which the other nodes follow then."""
-
-
-class _Loader(yaml.SafeLoader):
-    """Reads 1e-3 as a number, as ROS does; YAML 1.1 alone wants 1.0e-3."""
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$"), list("-+.0123456789")
-)
 
 
 @dataclass(frozen=True)
@@ -127,7 +120,7 @@ def read_yaml(path: Path) -> Any:
         BadInputError: if it cannot be read or is no such file.
     """
     try:
-        return yaml.load(path.read_text(), _Loader)
+        return load_yaml(read_start(path).decode())
     except OSError as error:
         raise BadInputError(f"Parameter file {path} cannot be read: {error.strerror}.") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
@@ -168,18 +161,31 @@ def _what_is_wrong(error: yaml.YAMLError | UnicodeDecodeError) -> str:
     return " ".join(str(error).split())
 
 
-def merge(values: dict[str, Any], newer: Values) -> None:
-    """Put newer values over older ones; nested blocks are merged, dotted names are blocks."""
+def merge(values: dict[str, Any], newer: Values, level: int = 1) -> None:
+    """Put newer values over older ones; nested blocks are merged, dotted names are blocks.
+
+    Raises:
+        BadInputError: if names have more parts than any parameter.
+    """
     for key, value in newer.items():
         *blocks, name = str(key).split(".")
+        if level + len(blocks) > DEEPEST:
+            raise BadInputError(f"Parameter {str(key)[:100]}... has too many parts; expected at most {DEEPEST}.")
         target = values
         for block in blocks:
-            target = target.setdefault(block, {})
+            target = _block(target, block)
         if isinstance(value, Mapping):
-            inner = target.setdefault(name, {})
-            merge(inner, value)
+            merge(_block(target, name), value, level + len(blocks) + 1)
         else:
             target[name] = value
+
+
+def _block(values: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return the block of a name; it takes the place of a value of that name."""
+    block = values.get(name)
+    if not isinstance(block, dict):
+        block = values[name] = {}
+    return block
 
 
 def known_names() -> str:

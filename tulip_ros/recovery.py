@@ -21,8 +21,9 @@ from tulip_ros import bag_metadata, mcap_scan
 from tulip_ros.bag_metadata import FileEntry, TopicEntry
 from tulip_ros.errors import BadInputError
 from tulip_ros.log_edit import making_room
-from tulip_ros.log_file import MAGIC, REPEATED, Log, files_of
-from tulip_ros.mcap_file import LIBRARY, Chunk, McapFile
+from tulip_ros.log_file import REPEATED, Log, files_of
+from tulip_ros.log_index import DAMAGES
+from tulip_ros.mcap_file import LIBRARY, MAGIC, Chunk, McapFile
 from tulip_ros.mcap_scan import Data, Found
 
 Advance = Callable[[int], None]
@@ -194,29 +195,37 @@ class _Source:
         elif opcode in (Opcode.MESSAGE, Opcode.ATTACHMENT, Opcode.METADATA):
             self.pieces.append(found)
             self.chunks += opcode == Opcode.MESSAGE
-            if opcode == Opcode.METADATA and read(Metadata, data, found).name == REPEATED:
+            note = read(Metadata, data, found) if opcode == Opcode.METADATA else None
+            if note is not None and note.name == REPEATED:
                 self._first_number = None  # the file goes on where another one ended
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             self._define(bytes(data[found.begin : found.end]))
         elif opcode == Opcode.STATISTICS:
             self._statistics = read(Statistics, data, found)
-        elif opcode == Opcode.HEADER and read(Header, data, found).library == LIBRARY:
-            self._first_number = -1  # messages are numbered from 0 on
+        elif opcode == Opcode.HEADER:
+            header = read(Header, data, found)
+            if header is not None and header.library == LIBRARY:
+                self._first_number = -1  # messages are numbered from 0 on
 
     def _define(self, content: bytes) -> None:
         for opcode, begin, end in mcap_scan.records(content):
             whole = Found(opcode, begin - mcap_scan.HEAD.size, end)
             if opcode == Opcode.SCHEMA:
                 schema = read(Schema, content, whole)
-                self.schemas.setdefault(schema.id, schema)
+                if schema is not None and _is_text(schema.data):
+                    self.schemas.setdefault(schema.id, schema)
             elif opcode == Opcode.CHANNEL:
                 channel = read(Channel, content, whole)
-                self.channels.setdefault(channel.id, channel)
+                if channel is not None:
+                    self.channels.setdefault(channel.id, channel)
 
 
 def read(kind: Any, data: Data, found: Found) -> Any:
-    """Return a record of a kind of `mcap.records`."""
-    return kind.read(ReadDataStream(BytesIO(data[found.begin + mcap_scan.HEAD.size : found.end])))
+    """Return a record of a kind of `mcap.records`, or None if its lengths lead out of it or its text is none."""
+    try:
+        return kind.read(ReadDataStream(BytesIO(data[found.begin + mcap_scan.HEAD.size : found.end])))
+    except DAMAGES:
+        return None
 
 
 def _write(sources: Sequence[_Source], output: Path, advance: Advance) -> None:
@@ -304,12 +313,21 @@ def _copy_chunk(source: _Source, found: Found, file: McapFile) -> None:
             file.add_chunk(chunk)
         return
     indices: dict[int, array[int]] = {}
-    for opcode, begin, _ in mcap_scan.records(content):
+    numbers: list[tuple[int, int]] = []
+    sound, place = True, 0
+    for opcode, begin, end in mcap_scan.records(content):
+        place = end
         if opcode == Opcode.MESSAGE:
-            channel, sequence, log_time, _ = mcap_scan.MESSAGE.unpack_from(content, begin)
+            message = mcap_scan.message_head(content, begin, end)
+            if message is None:
+                sound = False
+                continue
+            channel, sequence, log_time, _ = message
             indices.setdefault(channel, array("Q")).extend((log_time, begin - mcap_scan.HEAD.size))
+            numbers.append((channel, sequence))
+    if sound and place == len(content) and all(map(source.channel_is_known, indices)):
+        for channel, sequence in numbers:
             source.see(channel, sequence)
-    if all(map(source.channel_is_known, indices)):
         held = bytes(source.data[head.data : head.data + head.length])
         file.add_compressed(held, head.compression, head.span, head.size, head.checksum, indices)
         return
@@ -322,15 +340,24 @@ def _copy_chunk(source: _Source, found: Found, file: McapFile) -> None:
 def _take(source: _Source, content: bytes, chunk: Chunk) -> None:
     """Put all messages that can be read into a chunk."""
     for opcode, begin, end in mcap_scan.records(content):
-        if opcode != Opcode.MESSAGE or end - begin < mcap_scan.MESSAGE.size:
+        message = mcap_scan.message_head(content, begin, end) if opcode == Opcode.MESSAGE else None
+        if message is None:
             continue
-        channel, sequence, log_time, publish_time = mcap_scan.MESSAGE.unpack_from(content, begin)
+        channel, sequence, log_time, publish_time = message
         if source.channel_is_known(channel):
             chunk.add(channel, sequence, log_time, publish_time, content[begin + mcap_scan.MESSAGE.size : end])
             source.see(channel, sequence)
         else:
             topic = f"channel {channel}, whose topic and type are lost"
             source.saved.lost[topic] = source.saved.lost.get(topic, 0) + 1
+
+
+def _is_text(data: bytes) -> bool:
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def _beside(path: Path) -> Path:

@@ -6,16 +6,15 @@ import math
 import re
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
-from typing import Any
-
-import yaml
 
 from tulip_ros import schemas, topics
+from tulip_ros.bag_metadata import profiles_of
 from tulip_ros.errors import BadInputError
 from tulip_ros.log_file import Log, LoggedTopic, Record
 from tulip_ros.topics import Quality
 
 CLOCK_PERIOD = 20_000_000  # [ns] of recorded time between two messages on /clock: 50 Hz, as simulators have it
+DEEPEST = 1000  # messages that a sender keeps; a recording that asks for more is not obeyed
 SPARE = Quality(depth=50)  # of topics that this project does not know and whose recorder did not note it
 
 
@@ -198,10 +197,10 @@ def quality_of(topic: LoggedTopic) -> Quality:
     for known in topics.TOPICS:
         if topic.name.endswith(f"/{known.name.lstrip('/')}") and topic.type_name == known.type_name:
             return known.quality
+    profiles = profiles_of(topic.quality)
     try:
-        profiles: Any = yaml.safe_load(topic.quality) or []
         latched = bool(profiles) and all(each["durability"] in ("transient_local", 1) for each in profiles)
         depth = max((int(each["depth"]) for each in profiles), default=0)
-    except (yaml.YAMLError, KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         return SPARE
-    return Quality(depth if depth > 0 else SPARE.depth, latched)
+    return Quality(depth if 0 < depth <= DEEPEST else SPARE.depth, latched)

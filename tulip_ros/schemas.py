@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 PRIMITIVE = re.compile(r"(bool|byte|char|float32|float64|u?int(8|16|32|64)|w?string)(<=\d+)?$")
+NAME = re.compile(r"([a-z][a-z0-9_]{0,99})/(msg|srv|action)/([A-Z][A-Za-z0-9_]{0,99})")
+"""What a type can be called. Names come from recordings and from the graph: no other is looked for."""
 ARRAY = re.compile(r"\[[^\]]*\]$")
 SEPARATOR = "=" * 80 + "\n"
 
@@ -25,7 +27,8 @@ def message_class(type_name: str) -> type[Any]:
     Raises:
         LookupError: if the type is not installed.
     """
-    package, kind, name = type_name.split("/")
+    package, kind, name = _parts(type_name)
+    _text(type_name)  # a module of another kind is not even imported
     try:
         return getattr(importlib.import_module(f"{package}.{kind}"), name)
     except (ImportError, AttributeError) as error:
@@ -72,13 +75,20 @@ def _with_parts(text: str, type_name: str) -> str:
 
 def _text(type_name: str) -> str:
     prefixes = [*filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)), sys.prefix]
-    package, kind, name = type_name.split("/")
+    package, kind, name = _parts(type_name)
     for prefix in prefixes:
         path = Path(prefix) / "share" / package / kind / f"{name}.{kind}"
         if path.exists():
             text = path.read_text()
             return text if text.endswith("\n") else text + "\n"
     raise LookupError(f"the definition of {type_name} is not installed below {' or '.join(prefixes)}")
+
+
+def _parts(type_name: str) -> tuple[str, str, str]:
+    found = NAME.fullmatch(type_name)
+    if found is None:
+        raise LookupError(f"there can be no type {type_name[:100]!r}; expected a name as in sensor_msgs/msg/Image")
+    return found[1], found[2], found[3]
 
 
 def _parts_of(text: str, type_name: str) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +13,7 @@ from tulip_description.robot import Robot
 from tulip_ros import topics
 from tulip_view.columns import FEATURES
 from tulip_vision.annotation import annotate
+from tulip_vision.coded_picture import decode_picture
 from tulip_vision.lens import Lens, head_camera_lens
 from tulip_vision.lines import Lines
 from tulip_vision.messages import lens_from_message, picture_from_message
@@ -51,14 +51,12 @@ def lens_of(info: Any | None) -> tuple[Lens, bool]:
 
 def decoded(message: Any) -> Picture | None:
     """Return (height, width, 3) BGR of an Image or CompressedImage, or None for one that cannot be decoded."""
-    if isinstance(message, topics.CAMERA_IMAGE.message):
-        try:
+    try:
+        if isinstance(message, topics.CAMERA_IMAGE.message):
             return picture_from_message(message)
-        except ValueError:
-            return None
-    data = np.frombuffer(bytes(message.data), np.uint8)
-    picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
-    return None if picture is None else picture.astype(np.uint8)
+        return decode_picture(bytes(message.data))
+    except ValueError:
+        return None
 
 
 def with_features(

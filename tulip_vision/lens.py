@@ -19,6 +19,7 @@ from tulip_vision.pixel_loops import project_plumb_bob, rays_between
 
 Array = NDArray[np.float64]
 
+LARGEST_SIDE = 2**14  # [px] of a picture; tables are made of its size
 MODEL_NAMES = {"rational_polynomial": PLUMB_BOB, "fisheye": EQUIDISTANT}  # other names in use for the same two models
 
 
@@ -52,8 +53,8 @@ class Lens:
         model = MODEL_NAMES.get(model, model)
         if model not in COEFFICIENTS:
             raise ValueError(f"lens model is {model!r}; expected one of {', '.join((*COEFFICIENTS, *MODEL_NAMES))}")
-        if width < 1 or height < 1:
-            raise ValueError(f"picture is {width} x {height} px; expected at least 1 x 1")
+        if not 1 <= width <= LARGEST_SIDE or not 1 <= height <= LARGEST_SIDE:
+            raise ValueError(f"picture is {width} x {height} px; expected 1 to {LARGEST_SIDE} each")
         matrix = np.array(camera_matrix, dtype=np.float64)
         coefficients = np.array(distortion, dtype=np.float64).reshape(-1)
         if matrix.shape != (3, 3) or not np.isfinite(matrix).all() or min(matrix[0, 0], matrix[1, 1]) <= 0.0:

@@ -47,7 +47,7 @@ def read_lens(path: Path, size: tuple[int, int] | None = None) -> Lens:
     content = read_yaml(path, LensFileError)
     try:
         lens = lens_of(content, size)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise LensFileError(f"{path}: {error}") from None
     if size is not None and (lens.width, lens.height) != size:
         raise LensFileError(
@@ -62,6 +62,7 @@ def lens_of(content: Any, size: tuple[int, int] | None = None) -> Lens:
     Raises:
         ValueError: if it describes none.
         TypeError: if an entry is of another kind than expected.
+        OverflowError: if the picture's size is infinite.
     """
     if not isinstance(content, Mapping):
         raise ValueError(f"content is {type(content).__name__}; expected a mapping with {', '.join(KEYS)}")

@@ -53,10 +53,10 @@ def picture_from_message(message: Image) -> NDArray[np.uint8]:
     channels = CHANNELS[message.encoding]
     row = channels * message.width
     data = np.frombuffer(message.data, dtype=np.uint8)
-    if message.step < row or data.size != message.step * message.height:
+    if not row or not message.height or message.step < row or data.size != message.step * message.height:
         raise ValueError(
             f"picture has {data.size} bytes, {message.step} a row;"
-            f" expected {message.height} rows of at least {row} bytes"
+            f" expected {message.height} rows of at least {row} bytes, and not none"
         )
     picture = data.reshape(message.height, message.step)[:, :row].reshape(message.height, message.width, channels)
     if message.encoding == "rgb8":

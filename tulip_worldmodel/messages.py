@@ -20,6 +20,7 @@ from tulip_worldmodel.world_state import ObjectEstimate, WorldState
 
 PLANE = np.ix_((0, 1, 5), (0, 1, 5))
 """x, y and the rotation about z, among the six of a pose."""
+FARTHEST = 100.0  # [m] from the field's middle; no hall is larger
 
 
 def features_from_message(message: FeaturesMessage) -> Features:
@@ -109,7 +110,7 @@ def start_pose_from_message(message: PoseWithCovarianceStamped) -> Pose2D | None
     """Return where the robot was set down, or None if the message holds no pose on the ground."""
     place, turn = message.pose.pose.position, message.pose.pose.orientation
     values = (place.x, place.y, turn.x, turn.y, turn.z, turn.w)
-    if not all(math.isfinite(value) for value in values) or math.hypot(*values[2:]) < 0.5:
+    if not (math.hypot(*values[:2]) <= FARTHEST and 0.5 <= math.hypot(*values[2:]) <= 2.0):  # also catches NaN
         return None
     return pose_on_ground(values[:2], values[2:])
 

@@ -23,7 +23,8 @@ from tulip_msgs.msg import GameState, MotionState
 from tulip_ros import log_notes, topics
 from tulip_ros.bag import Bag, Split
 from tulip_ros.errors import BadInputError
-from tulip_ros.log_file import DamagedLogError, Log
+from tulip_ros.log_file import Log
+from tulip_ros.log_index import DamagedLogError
 from tulip_ros.lost_messages import LostMessages
 from tulip_ros.plan import read_parameters
 from tulip_ros.recorder_node import RecorderNode, RecorderParameters

@@ -17,7 +17,8 @@ from std_msgs.msg import String
 from typer.testing import CliRunner
 
 from tulip_ros import bag, mcap_scan, recovery, topics
-from tulip_ros.log_file import DamagedLogError, Log
+from tulip_ros.log_file import Log
+from tulip_ros.log_index import DamagedLogError
 from tulip_ros.mcap_file import McapFile
 
 TOPIC = "/words"

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from tulip_ros.cdr import without_gaps
-from tulip_ros.log_file import DamagedLogError, Log
+from tulip_ros.log_file import Log
+from tulip_ros.log_index import DamagedLogError
 from tulip_sim.recompute import line
 from tulip_sim.recompute.beside import BATCH, Beside
 from tulip_sim.recompute.run import recompute

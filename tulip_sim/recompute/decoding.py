@@ -11,12 +11,12 @@ from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from tulip_ros import topics
 from tulip_sim.recompute.heard import Heard
+from tulip_vision.coded_picture import decode_picture
 from tulip_vision.messages import picture_from_message
 
 RAW, COMPRESSED = topics.CAMERA_IMAGE.name, topics.CAMERA_COMPRESSED.name
@@ -52,7 +52,4 @@ def decoding_ahead(messages: Iterable[Heard]) -> Iterator[Heard]:
 
 
 def _decompressed(message: Any) -> NDArray[np.uint8]:
-    picture = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
-    if picture is None:
-        raise ValueError(f"data of format {message.format!r} is no picture; expected JPEG or PNG")
-    return np.asarray(picture, np.uint8)
+    return decode_picture(bytes(message.data))

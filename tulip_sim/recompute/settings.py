@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from tulip_description.field import Field, FieldError, load_field
 from tulip_description.planar import Pose2D
 from tulip_motion.head import HeadParameters
@@ -107,16 +105,11 @@ def noted(log: Log) -> dict[str, dict[str, Any]]:
     """Return the parameters that a recording's nodes had, by full node name, without those that are ROS's own.
 
     Raises:
-        BadInputError: if the recording's files of parameters are no YAML.
+        BadInputError: if the recording's files of parameters are no such YAML.
     """
-    try:
-        found = log_notes.parameters_of(log)
-    except (yaml.YAMLError, ValueError, TypeError) as error:
-        raise BadInputError(
-            f"Recording {log.path} holds parameters that cannot be read ({error}); expected YAML, as record.py has it."
-        ) from error
     return {
-        node: {name: value for name, value in block.items() if not _is_of_ros(name)} for node, block in found.items()
+        node: {str(name): value for name, value in block.items() if not _is_of_ros(str(name))}
+        for node, block in log_notes.parameters_of(log).items()
     }
 
 

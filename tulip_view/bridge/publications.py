@@ -12,6 +12,7 @@ from tulip_view.bridge.rules import why_not_publish
 
 Source = tuple[int, int]
 """A viewer, and its own number for what it publishes on."""
+MOST = 100  # topics that all viewers together may announce; one has as many as there are things that people say
 
 
 class Publications:
@@ -24,7 +25,10 @@ class Publications:
 
     def begin(self, source: Source, name: str, type_name: str, encoding: str) -> None:
         """A viewer may want to publish. Some announce what their buttons could publish: that alone is no fault."""
+        self.end(source)  # announced anew
         refusal = why_not_publish(name, type_name, encoding)
+        if len(self._publishers) + len(self._refusals) >= MOST:
+            return  # what comes on it is refused as not announced
         if refusal:
             self._refusals[source] = refusal
             return

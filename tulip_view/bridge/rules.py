@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.validate_full_topic_name import validate_full_topic_name
+
 from tulip_ros import topics
 from tulip_ros.topics import Service, is_called
 
@@ -32,9 +35,15 @@ def why_not_publish(name: str, type_name: str, encoding: str) -> str:
     topic = next((each for each in topics.FROM_PEOPLE if is_called(name, each)), None)
     if topic is None:
         open_ones = " and ".join(each.name for each in topics.FROM_PEOPLE)
-        return f"{name} is not for viewers to publish; only {open_ones} are. For the rest there are services."
+        return f"{name[:100]} is not for viewers to publish; only {open_ones} are. For the rest there are services."
+    if not (name.isascii() and name.isprintable()):  # as C ends a text at a byte 0, so would the check
+        return f"{name[:100]!r} is no name of a topic"
+    try:
+        validate_full_topic_name(f"/{name.removeprefix('/')}")
+    except InvalidTopicNameException as error:
+        return f"{name[:100]!r} is no name of a topic: {' '.join(str(error).split())[:200]}"
     if type_name not in (topic.type_name, topic.type_name.replace("/msg/", "/")):
-        return f"the type of {name} is {type_name}; expected {topic.type_name}"
+        return f"the type of {name} is {type_name[:100]}; expected {topic.type_name}"
     if encoding != ENCODING:
-        return f"the encoding of {name} is {encoding}; expected {ENCODING}"
+        return f"the encoding of {name} is {encoding[:100]}; expected {ENCODING}"
     return ""

@@ -67,7 +67,10 @@ def is_own(origin: str | None, lan: bool) -> bool:
     """
     if origin is None:
         return True
-    host = urlsplit(origin).hostname or ""
+    try:
+        host = urlsplit(origin).hostname or ""
+    except ValueError:  # no address at all
+        return False
     if host in ("localhost", socket.gethostname(), f"{socket.gethostname()}.local"):
         return True
     try:

@@ -190,7 +190,7 @@ def _referee(recording: Recording, end: float) -> tuple[list[Span | Mark], list[
     try:
         lines = json.loads(track.messages[-1].data)["log"]
         found = [(float(line["time"]), f"{line['text']} ({line['score'][0]}:{line['score'][1]})") for line in lines]
-    except (ValueError, KeyError, TypeError, IndexError):
+    except (ValueError, LookupError, TypeError, RecursionError):
         return [], [
             (float(track.times[-1]), "referee", f"a report that cannot be read: {track.messages[-1].data[:60]}")
         ]

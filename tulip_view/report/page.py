@@ -33,7 +33,7 @@ def make_page(report: Report) -> str:
     links = "".join(f'<a href="#{each.key}">{html.escape(each.title)}</a>' for each in report.sections)
     body = "".join(_section(section) for section in report.sections)
     title = html.escape(report.title)
-    content = json.dumps({"figures": figures, "replay": _packed(replay)}, allow_nan=False).replace("</", "<\\/")
+    content = json.dumps({"figures": figures, "replay": _packed(replay)}, allow_nan=False).replace("<", "\\u003c")
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>\n'
         f'<meta name="viewport" content="width=device-width">\n<style>\n{style}</style></head>\n<body>'
