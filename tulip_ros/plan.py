@@ -70,7 +70,7 @@ def make_plan(
 
     Args:
         nodes: Names of nodes; none means the whole robot.
-        driver: Name of the driver, or None for no driver.
+        driver: Name of the driver or package.module:Class of a body, or None for no driver.
         namespace: For all nodes, as in "striker".
         parameter_files: YAML files, later ones win.
         values: Parameters by node name, which win over the files.
@@ -94,6 +94,7 @@ def make_plan(
         for layer in ([read_parameters(own)] if own else []) + given:
             merge(merged, layer.get(EVERY_NODE, {}))
             merge(merged, layer.get(entry.name, {}))
+        merge(merged, dict(entry.parameters))
         starts.append(Start(entry.name, entry, merged, namespace))
     return tuple(starts)
 
@@ -184,4 +185,4 @@ def merge(values: dict[str, Any], newer: Values) -> None:
 
 def known_names() -> str:
     """Return all names of nodes and drivers, for help texts."""
-    return f"nodes: {', '.join(NODES)}; drivers: {', '.join(DRIVERS)}"
+    return f"nodes: {', '.join(NODES)}; drivers: {', '.join(DRIVERS)}, or package.module:Class"

@@ -19,8 +19,9 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 
 from tulip_description.field import load_field
-from tulip_description.robot import HEAD_JOINTS, LEG_JOINTS, load_robot
+from tulip_description.robot import load_robot
 from tulip_description.urdf import build_urdf
+from tulip_driver.findings import silent_joints
 from tulip_motion.messages import joint_command_from_message, sensors_to_messages
 from tulip_msgs.msg import FootForces
 from tulip_msgs.msg import JointCommand as JointCommandMessage
@@ -170,15 +171,9 @@ class RobotPort:
     def _command_health(self) -> Finding | None:
         """Tell how the joints are commanded: too late, or not at all any more."""
         late, self._late = self._late, 0
-        silent = set(self._node.world.silent_joints(self._robot))
-        parts = [part for part, joints in (("legs", LEG_JOINTS), ("head", HEAD_JOINTS)) if silent & set(joints)]
-        if parts:
-            nodes = " and ".join({"legs": "motion", "head": "head"}[part] for part in parts)
-            return Finding(
-                Level.ERROR,
-                f"{self._name}commands of the {' and '.join(parts)} outlived their time-to-live, the joints are only"
-                f" damped or limp: look after {nodes}",
-            )
+        silent = silent_joints(self._node.world.silent_joints(self._robot), self._name)
+        if silent is not None:
+            return silent
         if not late:
             return None
         self._node.health.count("late answers", times=late)
