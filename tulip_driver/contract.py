@@ -40,11 +40,13 @@ class Body(ABC):
         moves: Whether commands move it at all; a recorded body plays on whatever it is told.
         own_clock: Whether `exchange` waits for the body's next reading, which then sets the pace; otherwise an exchange
             returns at once and is made every PERIOD.
+        simulated: Whether each exchange advances the body's clock by PERIOD, however long it takes.
     """
 
     hardware: ClassVar[bool] = True
     moves: ClassVar[bool] = True
     own_clock: ClassVar[bool] = False
+    simulated: ClassVar[bool] = False
 
     @abstractmethod
     def start(self) -> None:

@@ -12,9 +12,9 @@ from tulip_description.posture import standing_posture
 from tulip_description.robot import Robot
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_driver.contract import Body
+from tulip_motion.lipm import GRAVITY
 
 Array = NDArray[np.float64]
-GRAVITY = 9.81  # [m/s^2]
 
 
 class EchoBody(Body):

@@ -30,6 +30,7 @@ class BodyLoop:
 
     Attributes:
         sensors: The newest reading, in the driver's time; None before the first.
+        told_at: When the newest command for the body was made [ns], in the driver's time.
         faults: Readings that were refused.
         fault: What was wrong with the last of them, or "".
     """
@@ -50,6 +51,7 @@ class BodyLoop:
             "imu_linear_acceleration": (3,),
             "foot_cells": (2, 4),
         }
+        self.told_at = 0
         self.faults, self.fault = 0, ""
         self.sensors: Sensors | None = None
         self._newest: int | None = None  # stamp of the newest reading on the body's clock [ns]
@@ -123,9 +125,9 @@ class BodyLoop:
         """
         command: JointCommand | None = None
         if self.sensors is not None:
-            now = self.now
-            self._guard.settle(now)
-            command = self._limiter.command(self._guard, now, self.sensors)
+            self.told_at = self.now
+            self._guard.settle(self.told_at)
+            command = self._limiter.command(self._guard, self.told_at, self.sensors)
             if command is not None:
                 command = replace(command, stamp=self._on_body(command.stamp))
         reading = self._body.exchange(command)

@@ -46,3 +46,12 @@ def command(
     fields = {"position": 0.0, "velocity": 0.0, "effort": 0.0, "stiffness": 0.0, "damping": 0.0, **values}
     full = {name: np.broadcast_to(np.asarray(value, dtype=float), len(names)) for name, value in fields.items()}
     return JointCommand(sequence, stamp, names, **full)
+
+
+class VirtualBody(EchoBody):
+    """The echo body in simulated time: as fast as the computer can."""
+
+    simulated = True
+
+    def __init__(self, robot: Robot = ROBOT) -> None:
+        super().__init__(robot, Clock())
