@@ -25,6 +25,7 @@ BODIES: dict[str, tuple[str, dict[str, Any]]] = {
     "echo": ("tulip_driver.echo:EchoBody", {}),
     "sim": ("tulip_sim.simulated_body:SimulatedBody", {"harness": True}),
     "log": ("tulip_driver.log_body:LogBody", {}),
+    "wire": ("tulip_driver.wire.body:WireBody", {}),
 }
 """Class of each driver, and the options that it is checked with."""
 COLOURS = {Judgement.PASS: "green", Judgement.FAIL: "bold red", Judgement.SKIPPED: "dim"}

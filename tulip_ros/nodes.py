@@ -54,6 +54,7 @@ NODES: dict[str, NodeEntry] = {
         NodeEntry("strategy", "tulip_strategy.strategy_node"),
         NodeEntry("game_input", "tulip_strategy.game_input_node"),
         NodeEntry("user_input", "tulip_strategy.user_input_node"),
+        NodeEntry("emulator", "tulip_sim.emulator_node", playing=False),
         NodeEntry("perception", "tulip_sim.perception_node", playing=False),
         NodeEntry("identify", "tulip_motion.identification.identify_node", playing=False),
         NodeEntry(AGGREGATOR, "tulip_ros.aggregator_node", playing=False),
@@ -80,6 +81,7 @@ DRIVERS: dict[str, NodeEntry] = {
     "match": NodeEntry(DRIVER, "tulip_sim.match_driver_node", playing=False),
     "log": NodeEntry(DRIVER, "tulip_sim.log_driver_node", playing=False),
     "echo": driver_of("tulip_driver.echo:EchoBody"),
+    "wire": driver_of("tulip_driver.wire.body:WireBody", ("clock", "body")),
 }
 """What can stand for the robot's body, for the bodies of two, or for a recorded one: each is a node named DRIVER."""
 

@@ -8,14 +8,12 @@ from tulip_description.field import load_field
 from tulip_description.robot import Robot
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_driver.contract import Body, BodyError
-from tulip_motion.lipm import GRAVITY
+from tulip_driver.parts import by_parts
+from tulip_sim.harness import Harness
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.scenario import SCENARIOS, make_scenario
 from tulip_sim.timing import TICK
 from tulip_sim.world import World
-
-LIFT = 0.10  # [m] of the harness: the feet are free
-ROPE = (5000.0, 680.0)  # [N/m], [N s/m]: critically damped for 23 kg
 
 
 class SimulatedBody(Body):
@@ -39,8 +37,9 @@ class SimulatedBody(Body):
             raise ValueError(f"scenario is {scenario!r}; expected one of {', '.join(SCENARIOS)}")
         if not isinstance(seed, int) or seed < 0:
             raise ValueError(f"seed is {seed!r}; expected an integer >= 0")
-        self._robot, self._scenario, self._seed, self._harness = robot, scenario, seed, harness
+        self._robot, self._scenario, self._seed, self._hangs = robot, scenario, seed, harness
         self._world: World | None = None
+        self._harness: Harness | None = None
 
     def start(self) -> None:
         """Make the world; the robot holds its posture until the first command."""
@@ -48,7 +47,7 @@ class SimulatedBody(Body):
         field = load_field()
         scenario = make_scenario(self._scenario, np.random.default_rng(self._seed), field)
         self._world = World(scenario, WorldParameters(), self._seed, field, self._robot)
-        self._hook = self._world.truth().base_position + np.array([0.0, 0.0, LIFT])
+        self._harness = Harness(self._world) if self._hangs else None
 
     def exchange(self, command: JointCommand | None) -> Sensors:
         """Give the command to the joints' driver, and let a tick pass.
@@ -58,12 +57,12 @@ class SimulatedBody(Body):
         """
         if self._world is None:
             raise BodyError("The simulated body was not started; call start() first.")
-        if command is not None:
-            reason = self._world.apply(command)
+        for part in by_parts(command) if command is not None else ():
+            reason = self._world.apply(part)
             if reason:
                 raise BodyError(f"The simulated joints refuse a command: {reason}.")
-        if self._harness:
-            self._pull(self._world)
+        if self._harness is not None:
+            self._harness.pull()
         self._world.advance(TICK)
         return self._world.sensors()
 
@@ -72,9 +71,3 @@ class SimulatedBody(Body):
         if self._world is not None:
             self._world.close()
             self._world = None
-
-    def _pull(self, world: World) -> None:
-        """Hold the trunk as a rope to a hook above would: no moments."""
-        truth, (stiffness, damping) = world.truth(), ROPE
-        force = stiffness * (self._hook - truth.base_position) - damping * truth.base_linear_velocity
-        world.push(force + np.array([0.0, 0.0, self._robot.mass * GRAVITY]), TICK)

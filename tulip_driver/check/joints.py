@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ def check_joints(rig: Rig, home: Array) -> Iterator[Row]:
     for joint, name in enumerate(rig.robot.joint_names):
         way = np.zeros(len(home))
         way[joint] = SWAY if home[joint] < middle[joint] else -SWAY  # away from the nearer end of its range
-        yield _check_joint(rig, name, joint, home, way)
+        yield rig.undisturbed(partial(_check_joint, rig, name, joint, home, way))
 
 
 def _check_joint(rig: Rig, name: str, joint: int, home: Array, way: Array) -> Row:
