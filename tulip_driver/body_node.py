@@ -52,6 +52,7 @@ class BodyNodeParameters:
     # "host": readings are stamped with this computer's time, as on a robot. "body": the body's own clock is that of the
     # whole graph, sent as /clock; for emulated bodies, which may be slower than the wall clock.
     clock: str = "host"
+    rate: float = 1.0  # share of the joints' greatest speeds that wanted positions move with; 0.03 for a first stand
     hot: float = 80.0  # [deg C] of a motor, above which somebody is warned; assumed, from windings of class B
     low_voltage: float = 0.0  # [V] of the battery, below which somebody is warned
     guard: GuardParameters = field(default_factory=GuardParameters)
@@ -64,6 +65,8 @@ class BodyNodeParameters:
         """
         if self.clock not in CLOCKS:
             raise ValueError(f"clock is {self.clock!r}; expected one of {', '.join(CLOCKS)}")
+        if not 0.0 < self.rate <= 1.0:
+            raise ValueError(f"rate is {self.rate}; expected more than 0 and at most 1")
         for name in ("hot", "low_voltage"):
             if not math.isfinite(getattr(self, name)):
                 raise ValueError(f"{name} is {getattr(self, name)}; expected a finite number")
@@ -80,7 +83,7 @@ class BodyNode(ComponentNode):
         self._cells = np.array([foot.cells for foot in self._robot.feet])
         try:
             body = make_body(p.body, self._robot, read_options(p.options))
-            self.loop = BodyLoop(body, self._robot, p.guard, host_clock if p.clock == "host" else None)
+            self.loop = BodyLoop(body, self._robot, p.guard, host_clock if p.clock == "host" else None, p.rate)
             self._own_clock = flag(body, "own_clock")
             outputs = (topics.JOINT_STATES, topics.IMU, topics.FOOT_FORCES, topics.BATTERY, topics.ROBOT_DESCRIPTION)
             self._joints, self._imu, self._forces, self._battery, description = map(self.sender, outputs)

@@ -22,9 +22,16 @@ class Limiter:
 
     Args:
         robot: Gives joint names and limits.
+        rate: Share of the joints' greatest speeds that wanted positions move with at most, above 0.
+
+    Raises:
+        ValueError: if rate is not above 0.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, rate: float = 1.0) -> None:
+        if not rate > 0.0:
+            raise ValueError(f"rate is {rate}; expected more than 0")
+        self._rate = rate
         self._index = {name: index for index, name in enumerate(robot.joint_names)}
         self._sequence = 0
         self.begin_anew()
@@ -48,7 +55,9 @@ class Limiter:
         measured = sensors.joint_positions
         anew = np.isnan(self._sent)
         before = np.where(anew, measured, self._sent)
-        step = np.where(anew, 0.0, guard.velocity_limit * min(max(now - self._sent_at, 0), LONGEST_STEP) * 1e-9)
+        step = np.where(
+            anew, 0.0, self._rate * guard.velocity_limit * min(max(now - self._sent_at, 0), LONGEST_STEP) * 1e-9
+        )
         stiff = guard.stiffness > 0.0
         position = np.where(stiff, np.clip(guard.position, before - step, before + step), measured)
         self._sent, self._sent_at = np.where(stiff, position, np.nan), now

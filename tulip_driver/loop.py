@@ -27,6 +27,7 @@ class BodyLoop:
         parameters: Of the guard.
         clock: The computer's time [ns], in which readings are stamped and commands grow old; None: the body's own
             clock rules both, as in a simulation that may be slower than the wall clock.
+        rate: Share of the joints' greatest speeds that wanted positions move with at most.
 
     Attributes:
         sensors: The newest reading, in the driver's time; None before the first.
@@ -36,10 +37,15 @@ class BodyLoop:
     """
 
     def __init__(
-        self, body: Body, robot: Robot, parameters: GuardParameters, clock: Callable[[], int] | None = None
+        self,
+        body: Body,
+        robot: Robot,
+        parameters: GuardParameters,
+        clock: Callable[[], int] | None = None,
+        rate: float = 1.0,
     ) -> None:
         self._body, self._clock = body, clock
-        self._guard, self._limiter = Guard(robot, parameters), Limiter(robot)
+        self._guard, self._limiter = Guard(robot, parameters), Limiter(robot, rate)
         self._too_old = parameters.time_to_live * MILLISECOND
         n = len(robot.joint_names)
         self._shapes = {

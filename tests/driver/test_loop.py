@@ -65,6 +65,18 @@ def test_wanted_position_starts_at_the_measured_one_and_moves_no_faster_than_the
     assert 0.0 <= steps[0] <= 15.0 * PERIOD * 1e-9 + 1e-12
 
 
+def test_with_a_smaller_rate_a_robot_creeps_to_its_posture() -> None:
+    body = NotedBody()
+    loop = BodyLoop(body, ROBOT, GuardParameters(), rate=0.02)
+    loop.start()
+    loop.tick()
+    start = loop.sensors.joint_positions[KNEE]
+    for sequence in range(1, 252):
+        loop.accept(command(loop.now, sequence, position=2.4, stiffness=100.0))
+        loop.tick()
+    assert told(body).position[KNEE] - start == pytest.approx(0.02 * 15.0 * 1.0)  # a second at 0.3 rad/s
+
+
 def test_after_limp_the_joint_starts_from_where_it_is_and_not_from_its_last_wanted_position() -> None:
     loop, body = started()
     loop.accept(command(loop.now, 1, position=loop.sensors.joint_positions[:12], stiffness=100.0))

@@ -61,7 +61,7 @@ class WireBody(Body):
         self.bad, self.last_bad = 0, ""
         self._sequence, self._heard = 0, 0
         self._newest = None
-        self._link = SerialLine(self._device, self._baud) if self._device else UdpClient(self._address, self._port)
+        self._link = self.connect()
         end = time.monotonic() + self._patience
         known = False
         while not (known and self._newest is not None):
@@ -72,6 +72,14 @@ class WireBody(Body):
             while (left := again - time.monotonic()) > 0.0 and not (known and self._newest is not None):
                 known |= self._receive(left) is Kind.IDENTITY
         self._silent_since = time.monotonic()
+
+    def connect(self) -> Link:
+        """Open the way to the body.
+
+        Raises:
+            BodyError: if that is not possible.
+        """
+        return SerialLine(self._device, self._baud) if self._device else UdpClient(self._address, self._port)
 
     def exchange(self, command: JointCommand | None) -> Sensors:
         """Send the command, and wait for the next reading."""

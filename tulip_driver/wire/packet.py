@@ -91,17 +91,21 @@ def decode(data: bytes) -> Packet:
     sync, version, kind, sequence, stamp, count = HEADER.unpack_from(data)
     if sync != SYNC:
         raise WireError(f"packet begins with {sync!r}; expected {SYNC!r}")
-    if version != VERSION:  # before all else: another version may have its checksum elsewhere
+    if version != VERSION:  # before the length: another version may have longer frames
         raise VersionError(f"packet is of version {version} of the wire; expected {VERSION}")
     length = HEADER.size + count * FRAME.itemsize + CHECKSUM.size
     if len(data) != length:
         raise WireError(f"packet is {len(data)} bytes long; expected {length} with its {count} frames")
-    (checksum,) = CHECKSUM.unpack_from(data, length - CHECKSUM.size)
-    if checksum != zlib.crc32(data[: length - CHECKSUM.size]):
-        raise WireError(f"checksum is {checksum:08x}; expected {zlib.crc32(data[: length - CHECKSUM.size]):08x}")
+    expected = zlib.crc32(data[: -CHECKSUM.size])
+    if _checksum(data) != expected:
+        raise WireError(f"checksum is {_checksum(data):08x}; expected {expected:08x}")
     if kind not in Kind.__members__.values():
         raise WireError(f"packet is of kind {kind}; expected one of {', '.join(str(int(each)) for each in Kind)}")
     return Packet(Kind(kind), sequence, stamp, np.frombuffer(data, FRAME, count, HEADER.size))
+
+
+def _checksum(data: bytes) -> int:
+    return int(CHECKSUM.unpack_from(data, len(data) - CHECKSUM.size)[0])
 
 
 class Stream:
@@ -113,7 +117,7 @@ class Stream:
         """Bytes that belonged to no packet."""
 
     def feed(self, data: bytes) -> Iterator[bytes]:
-        """Take further bytes and yield what may be packets, whole; `decode` tells whether they are."""
+        """Take further bytes and yield whatever has a right checksum; `decode` tells whether it is a packet."""
         self._bytes += data
         while True:
             start = self._bytes.find(SYNC)
@@ -125,15 +129,11 @@ class Stream:
             if len(self._bytes) < length:
                 return
             whole = bytes(self._bytes[:length])
-            try:
-                decode(whole)
-            except VersionError:
-                pass  # whoever reads it shall know
-            except WireError:
+            if _checksum(whole) == zlib.crc32(whole[: -CHECKSUM.size]):
+                del self._bytes[:length]
+                yield whole
+            else:
                 self._skip(1)  # a sync in the midst of noise: the next one may be right
-                continue
-            del self._bytes[:length]
-            yield whole
 
     def _skip(self, count: int) -> None:
         del self._bytes[:count]
