@@ -23,6 +23,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from tulip_driver.wire.links import PORT as WIRE_PORT
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, require, unknown
 from tulip_ros.picture_rate import PICTURE_RATE, PictureRate
 from tulip_ros.plan import Start
@@ -46,6 +47,7 @@ from tulip_strategy.game_controller import REFEREE_PORT
 from tulip_view.live.beside import PORT, address, page_beside
 
 MODES = ("graph", "lockstep")
+DRIVERS = ("sim", "wire")
 EYES = {"camera": None, "degraded": PerceptionParameters(), "ideal": PerceptionParameters.ideal()}
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 LONGEST = 155.0  # [s] preparation and 150 s of play
@@ -84,6 +86,10 @@ def main(
     playing_time: Annotated[float, typer.Option(help="Seconds of each trial of a match.")] = MatchRules.playing_time,
     striker: Annotated[str, typer.Option(help="Strategy of the robot; of a match's striker.")] = MatchSettings.striker,
     keeper: Annotated[str, typer.Option(help="Strategy of a match's goalkeeper.")] = MatchSettings.keeper,
+    driver: Annotated[
+        str, typer.Option(help="sim, or wire: the body in a process of its own, behind bytes over UDP (graph).")
+    ] = "sim",
+    wire_port: Annotated[int, typer.Option(help="UDP port of that body.", min=1, max=65535)] = WIRE_PORT,
     view: Annotated[bool, typer.Option("--view", help="Open a page to watch and steer in a browser (graph).")] = False,
     view_port: Annotated[int, typer.Option(help="TCP port of that page.", min=1, max=65535)] = PORT,
 ) -> None:
@@ -107,6 +113,10 @@ def main(
             raise BadInputError(f"--engine is {engine!r}; expected {' or '.join(ENGINES)}.")
         if engine == "mujoco":
             require("mujoco", "mujoco")
+        if driver not in DRIVERS:
+            raise BadInputError(f"--driver is {driver!r}; expected one of {', '.join(DRIVERS)}.")
+        if driver == "wire" and (mode != "graph" or teams == 2):
+            raise BadInputError("--driver wire is for one robot as a graph; expected --mode graph --teams 1.")
         if mode != "graph" and (parameters or logs or view):
             raise BadInputError("--parameters, --logs and --view are for nodes; expected --mode graph with them.")
         kinds = tuple(PICTURES) if mode == "graph" else KINDS
@@ -162,6 +172,7 @@ def main(
                     perception=EYES[eyes],
                     strategy=striker,
                     beside=page,
+                    wire_port=wire_port if driver == "wire" else None,
                 )
             else:
                 beside = (os.cpu_count() or 1) > 1 and EYES[eyes] is None

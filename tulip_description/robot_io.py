@@ -7,12 +7,28 @@ millisecond with fresh joint readings, and the driver saturates it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Battery:
+    """What is left to drive the motors; NaN where it is not known.
+
+    Attributes:
+        voltage: [V].
+        current: Drawn from it, positive [A].
+        charge: Share left, 0 to 1.
+    """
+
+    voltage: float
+    current: float = math.nan
+    charge: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -30,6 +46,8 @@ class Sensors:
         imu_linear_acceleration: (3,) specific force in imu_link [m/s^2]; +g upwards at rest.
         foot_cells: (2, 4) vertical force of each cell [N]; rows left, right; columns heel inner,
             heel outer, toe inner, toe outer.
+        joint_temperatures: (14,) of the motors [deg C], NaN where unknown; None: the body measures none.
+        battery: None: the body does not tell.
     """
 
     stamp: int
@@ -40,6 +58,8 @@ class Sensors:
     imu_angular_velocity: Array
     imu_linear_acceleration: Array
     foot_cells: Array
+    joint_temperatures: Array | None = None
+    battery: Battery | None = None
 
 
 @dataclass(frozen=True)

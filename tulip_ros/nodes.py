@@ -17,11 +17,13 @@ class NodeEntry:
         name: Name in the graph.
         module: Module that runs it, as in `python -m MODULE`.
         playing: Part of the robot that plays; such a node never sees the ground truth.
+        parameters: Values that it always starts with, by name.
     """
 
     name: str
     module: str
     playing: bool = True
+    parameters: tuple[tuple[str, str], ...] = ()
 
     @property
     def package(self) -> str:
@@ -52,6 +54,7 @@ NODES: dict[str, NodeEntry] = {
         NodeEntry("strategy", "tulip_strategy.strategy_node"),
         NodeEntry("game_input", "tulip_strategy.game_input_node"),
         NodeEntry("user_input", "tulip_strategy.user_input_node"),
+        NodeEntry("emulator", "tulip_sim.emulator_node", playing=False),
         NodeEntry("perception", "tulip_sim.perception_node", playing=False),
         NodeEntry("identify", "tulip_motion.identification.identify_node", playing=False),
         NodeEntry(AGGREGATOR, "tulip_ros.aggregator_node", playing=False),
@@ -67,10 +70,18 @@ NODES: dict[str, NodeEntry] = {
 DRIVER = "driver"
 """Name in the graph of whatever stands for the robot's body."""
 
+
+def driver_of(body: str, *parameters: tuple[str, str]) -> NodeEntry:
+    """Return the driver that runs a body's class, as in package.module:Class."""
+    return NodeEntry(DRIVER, "tulip_driver.body_node", playing=False, parameters=(("body", body), *parameters))
+
+
 DRIVERS: dict[str, NodeEntry] = {
     "sim": NodeEntry(DRIVER, "tulip_sim.driver_node", playing=False),
     "match": NodeEntry(DRIVER, "tulip_sim.match_driver_node", playing=False),
     "log": NodeEntry(DRIVER, "tulip_sim.log_driver_node", playing=False),
+    "echo": driver_of("tulip_driver.echo:EchoBody"),
+    "wire": driver_of("tulip_driver.wire.body:WireBody", ("clock", "body")),
 }
 """What can stand for the robot's body, for the bodies of two, or for a recorded one: each is a node named DRIVER."""
 
@@ -92,9 +103,14 @@ def find_node(name: str) -> NodeEntry:
 def find_driver(name: str) -> NodeEntry:
     """Return a driver's entry.
 
+    Args:
+        name: One of DRIVERS, or anybody's body as package.module:Class, which the node itself looks for.
+
     Raises:
         BadInputError: if there is no driver of that name.
     """
+    if ":" in name:
+        return driver_of(name)
     if name not in DRIVERS:
         raise unknown("driver", name, DRIVERS)
     return DRIVERS[name]

@@ -19,7 +19,7 @@ from tulip_ros.nodes import DRIVERS, NODES, ROBOT, NodeEntry, find_driver, find_
 Values = Mapping[str, Any]
 EVERY_NODE = "/**"
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*")
-SIMULATED = frozenset({"sim", "match", "log"})
+SIMULATED = frozenset({"sim", "match", "log", "wire"})
 """Drivers that publish /clock, which the other nodes follow then."""
 
 
@@ -63,7 +63,7 @@ def make_plan(
 
     Args:
         nodes: Names of nodes; none means the whole robot.
-        driver: Name of the driver, or None for no driver.
+        driver: Name of the driver or package.module:Class of a body, or None for no driver.
         namespace: For all nodes, as in "striker".
         parameter_files: YAML files, later ones win.
         values: Parameters by node name, which win over the files.
@@ -87,6 +87,7 @@ def make_plan(
         for layer in ([read_parameters(own)] if own else []) + given:
             merge(merged, layer.get(EVERY_NODE, {}))
             merge(merged, layer.get(entry.name, {}))
+        merge(merged, dict(entry.parameters))
         starts.append(Start(entry.name, entry, merged, namespace))
     return tuple(starts)
 
@@ -190,4 +191,4 @@ def _block(values: dict[str, Any], name: str) -> dict[str, Any]:
 
 def known_names() -> str:
     """Return all names of nodes and drivers, for help texts."""
-    return f"nodes: {', '.join(NODES)}; drivers: {', '.join(DRIVERS)}"
+    return f"nodes: {', '.join(NODES)}; drivers: {', '.join(DRIVERS)}, or package.module:Class"

@@ -17,7 +17,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image, Imu, JointState
+from sensor_msgs.msg import BatteryState, CameraInfo, CompressedImage, Image, Imu, JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
@@ -190,6 +190,7 @@ FOOT_FORCES = Topic(
     rate=250,
     missed_after=0.1,
 )
+BATTERY = Topic("battery_state", BatteryState, STATE, ("driver",), (), "once a second, from bodies that know it")
 LEG_COMMAND = Topic(
     "legs/joint_command",
     JointCommand,
@@ -359,6 +360,7 @@ TOPICS: tuple[Topic, ...] = (
     JOINT_STATES,
     IMU,
     FOOT_FORCES,
+    BATTERY,
     LEG_COMMAND,
     HEAD_JOINT_COMMAND,
     FEATURES,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
@@ -17,7 +18,7 @@ from tulip_sim.referee import Referee, RefereeParameters
 from tulip_sim.referee_link import hear_replies, open_referee
 from tulip_sim.scenario import SCENARIOS, make_scenario
 from tulip_sim.secret_body import hidden_truth
-from tulip_sim.simulator_node import SimulatorNode, SimulatorParameters, Spin
+from tulip_sim.simulator_node import Joints, SimulatorNode, SimulatorParameters, Spin, TopicJoints
 from tulip_sim.truth import Truth
 from tulip_sim.world import World
 
@@ -48,16 +49,29 @@ class DriverNodeParameters(SimulatorParameters):
 class DriverNode(SimulatorNode):
     """Owns the world of one robot."""
 
-    def __init__(self) -> None:
-        """Make the world and connect it."""
-        super().__init__("driver")
-        p = self._settings = self.load(DriverNodeParameters())
+    def __init__(
+        self,
+        name: str = "driver",
+        defaults: DriverNodeParameters | None = None,
+        joints: Callable[[SimulatorNode, int, str], Joints] = TopicJoints,
+        tells_time: bool = True,
+    ) -> None:
+        """Make the world and connect it.
+
+        Args:
+            name: Of the node.
+            defaults: Its parameters.
+            joints: As for `SimulatorNode.prepare`.
+            tells_time: As for `SimulatorNode.prepare`.
+        """
+        super().__init__(name)
+        p = self._settings = self.load(defaults or DriverNodeParameters())
         self._field, self._robot = load_field(), load_robot()
         self._referee = Referee(p.rules, self._field)
         self._referee_socket = (
             open_referee(p.referee_address, p.referee_port, p.rules.version, p.reply_port) if p.referee else None
         )
-        self.prepare(p, [("", p.pictures)])
+        self.prepare(p, [("", p.pictures)], joints, tells_time)
         for service, answer in (
             (topics.RESET, self._on_reset),
             (topics.PLACE_BALL, self._on_place_ball),

@@ -28,6 +28,7 @@ from tulip_strategy.game_controller import REFEREE_PORT
 NODES = ("vision", "worldmodel", "head", "motion", "strategy", "game_input", "user_input")
 LOOK = 0.1  # [s] between two looks at the processes
 SILENCE = 60.0  # [s] of wall-clock time without news from the simulator after which the trial is given up
+START = 60  # [s] that the driver waits for an emulated body, whose time begins when all nodes are there
 ENDING = 0.5  # [s] of wall-clock time that the recording goes on after the end
 
 Progress = Callable[[float, str], None]
@@ -88,10 +89,12 @@ def trial_plan(
     referee_port: int = REFEREE_PORT,
     perception: PerceptionParameters | None = None,
     strategy: str = "dribble_and_kick",
+    wire_port: int | None = None,
 ) -> tuple[Start, ...]:
     """Return the nodes of a trial: simulator, robot, and recorder if wanted. Arguments as for `play_graph`.
 
-    With `perception` node perception stands in for vision, without pictures: for fast tests of behaviour only.
+    With a `wire_port` the body is emulated: a process of its own, whose joints and sensors go over that UDP port to the
+    driver. With `perception` node perception stands in for vision, without pictures: for fast tests of behaviour only.
 
     Raises:
         BadInputError: for an unknown scenario, or files that cannot be used.
@@ -99,8 +102,9 @@ def trial_plan(
     if scenario not in SCENARIOS:
         raise unknown("scenario", scenario, SCENARIOS)
     start = make_scenario(scenario, np.random.default_rng(seed), load_field()).robot
+    simulator = "driver" if wire_port is None else "emulator"
     given: dict[str, dict[str, Any]] = {
-        "driver": {"scenario": scenario, "seed": seed, "referee_port": referee_port, "wait_for": list(NODES)},
+        simulator: {"scenario": scenario, "seed": seed, "referee_port": referee_port, "wait_for": list(NODES)},
         # The team tells its robot where it was put down, as people do on the real field.
         "worldmodel": {"start_x": start.x, "start_y": start.y, "start_yaw": start.yaw},
         "game_input": {"port": referee_port},
@@ -109,7 +113,7 @@ def trial_plan(
     nodes = list(NODES)
     if perception is not None:
         nodes[nodes.index("vision")] = "perception"
-        given["driver"].update(wait_for=list(nodes), camera=False)
+        given[simulator].update(wait_for=list(nodes), camera=False)
         given["perception"] = {"seed": seed, **{f"quality.{name}": value for name, value in asdict(perception).items()}}
     if record is not None:
         nodes.append("recorder")
@@ -118,11 +122,16 @@ def trial_plan(
             "notes": [f"seed={seed}", f"scenario={scenario}", f"strategy={strategy}", "mode=graph", "robots=1"],
             "wait_for": ["driver", *(name for name in nodes if name != "recorder")],
         }
-        given["driver"]["wait_for"] = list(nodes)
+        given[simulator]["wait_for"] = list(nodes)
+    if wire_port is not None:
+        nodes.append(simulator)
+        given[simulator]["wait_for"].append("driver")
+        given[simulator]["port"] = wire_port
+        given["driver"] = {"options": [f"port={wire_port}", f"patience={START}"]}
     refuse_taken(parameter_files, given, "trial")
     for name, own in (values or {}).items():
         given.setdefault(name, {}).update(own)
-    return make_plan(nodes, "sim", parameter_files=parameter_files, values=given)
+    return make_plan(nodes, "sim" if wire_port is None else "wire", parameter_files=parameter_files, values=given)
 
 
 def refuse_taken(parameter_files: Sequence[Path], given: Mapping[str, Mapping[str, Any]], what: str) -> None:
@@ -156,6 +165,7 @@ def play_graph(
     perception: PerceptionParameters | None = None,
     strategy: str = "dribble_and_kick",
     beside: Sequence[Start] = (),
+    wire_port: int | None = None,
 ) -> TrialSummary:
     """Play one trial.
 
@@ -172,11 +182,12 @@ def play_graph(
         perception: How good node perception is, which then stands in for vision; None for camera and vision.
         strategy: Name of what the robot plays.
         beside: Further nodes to run, as a view.
+        wire_port: UDP port between the driver and an emulated body; None for the simulator as the driver.
 
     Raises:
         BadInputError: if a node refuses what it was given, or the simulator falls silent.
     """
-    plan = trial_plan(seed, scenario, record, parameter_files, values, referee_port, perception, strategy)
+    plan = trial_plan(seed, scenario, record, parameter_files, values, referee_port, perception, strategy, wire_port)
     with (
         Launcher((*plan, *beside), logs) as launcher,
         session(TrialWatcher, arguments=[], handle_signals=False) as (watcher, spin),

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from tulip_description.materials import Materials
+from tulip_driver.guard import GuardParameters, check_leg_gains
 
 ENGINES = ("pybullet", "mujoco")
 """Physics engines that can stand behind a world."""
@@ -52,14 +53,9 @@ class SensorParameters:
 
 
 @dataclass(frozen=True)
-class DriverParameters:
-    """Behaviour of the joint driver."""
+class DriverParameters(GuardParameters):
+    """Behaviour of the joint driver: the guard's, and that of the simulated motors."""
 
-    time_to_live: int = 100  # [ms] of a command; long enough for a garbage collection, short against a fall of 0.5 s
-    damping_time: int = 500  # [ms] after that: damping only, so that the robot sinks instead of dropping
-    # Of each leg joint from the hip down. The ankle roll carries only 0.0006 kg m^2: much more is unstable at 1 kHz.
-    damping: tuple[float, ...] = (1.0, 4.0, 4.0, 4.0, 1.0, 0.2)  # [N m s/rad]
-    head_damping: float = 0.05  # [N m s/rad]
     full_torque_speed: float = 0.8  # share of the top speed up to which full torque is there; it falls to 0 at the top
     # Until the first command the legs hold the start posture with these gains, which carry the robot in double support.
     hold_stiffness: tuple[float, ...] = (150.0, 400.0, 400.0, 400.0, 200.0, 200.0)  # [N m/rad] [trial]
@@ -72,14 +68,9 @@ class DriverParameters:
         Raises:
             ValueError: if one is out of its range.
         """
-        for name in ("damping", "hold_stiffness", "hold_damping"):
-            values = getattr(self, name)
-            if len(values) != 6 or min(values) < 0.0:
-                raise ValueError(f"{name} is {values}; expected six numbers >= 0, from hip yaw to ankle roll")
-        if self.time_to_live < 1 or self.damping_time < 0:
-            raise ValueError(
-                f"time_to_live is {self.time_to_live} ms, damping_time {self.damping_time} ms; expected >= 1 and >= 0"
-            )
+        super().__post_init__()
+        check_leg_gains("hold_stiffness", self.hold_stiffness)
+        check_leg_gains("hold_damping", self.hold_damping)
         if not 0.0 < self.full_torque_speed < 1.0:
             raise ValueError(f"full_torque_speed is {self.full_torque_speed}; expected between 0 and 1")
 

@@ -19,8 +19,9 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 
 from tulip_description.field import load_field
-from tulip_description.robot import HEAD_JOINTS, LEG_JOINTS, load_robot
+from tulip_description.robot import load_robot
 from tulip_description.urdf import build_urdf
+from tulip_driver.findings import silent_joints
 from tulip_motion.messages import joint_command_from_message, sensors_to_messages
 from tulip_msgs.msg import FootForces
 from tulip_msgs.msg import JointCommand as JointCommandMessage
@@ -52,7 +53,7 @@ class SimulatorParameters:
     """How a simulator runs."""
 
     mode: str = "sync"  # "sync" waits for the answer to each tick's sensors; "free" follows the wall clock
-    speed: float = 1.0  # times real time at most; 0 for as fast as it can
+    speed: float = 1.0  # times real time at most; 0 for as fast as it can (with "sync" alone)
     seed: int = 0
     camera: bool = True
     referee: bool = True
@@ -78,39 +79,54 @@ class SimulatorParameters:
         for name in ("speed", "answer_bound", "start_bound"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(f"{name} is {getattr(self, name)}; expected a finite number >= 0")
+        if self.mode == "free" and self.speed == 0.0:
+            raise ValueError("speed is 0 in mode 'free'; expected > 0, since nothing else holds the time")
         if self.seed < 0:
             raise ValueError(f"seed is {self.seed}; expected >= 0")
 
 
-class RobotPort:
-    """One robot's body on topics: joint commands in; sensors, pictures and truth out."""
+class Joints(ABC):
+    """The way of one robot's sensors to who commands it, and of the commands back."""
 
-    def __init__(self, node: SimulatorNode, robot: int, namespace: str, camera: CameraParameters) -> None:
+    @abstractmethod
+    def begin_anew(self) -> None:
+        """Wait for the first command."""
+
+    @abstractmethod
+    def measure(self) -> None:
+        """Read the sensors; their answer is due in the tick after this one."""
+
+    @abstractmethod
+    def send(self) -> None:
+        """Send what was measured, for the first time or again."""
+
+    @property
+    @abstractmethod
+    def answered(self) -> bool:
+        """Whether the answer to the sensors of the tick before is in, if there were any."""
+
+    @abstractmethod
+    def obey(self) -> None:
+        """Give the answer to the joints, and ask for the next."""
+
+
+class TopicJoints(Joints):
+    """Sensors and joint commands on topics, as a driver has them."""
+
+    def __init__(self, node: SimulatorNode, robot: int, namespace: str) -> None:
         """Connect.
 
         Args:
             node: Owns the world.
             robot: Number in the world.
             namespace: Of the robot's topics, below the node's own; "" for none.
-            camera: How the robot's camera sees.
         """
         self._node, self._robot = node, robot
-        body, self._lens = load_robot(), head_camera_lens()
+        body = load_robot()
         self._cells = np.array([foot.cells for foot in body.feet])
-        self._camera = CameraRenderer(camera, load_field(), body, self._lens)
-        outputs = (
-            topics.JOINT_STATES,
-            topics.IMU,
-            topics.FOOT_FORCES,
-            topics.CAMERA_IMAGE,
-            topics.CAMERA_COMPRESSED,
-            topics.GROUND_TRUTH,
-            topics.CAMERA_INFO,
-            topics.ROBOT_DESCRIPTION,
-        )
+        outputs = (topics.JOINT_STATES, topics.IMU, topics.FOOT_FORCES, topics.ROBOT_DESCRIPTION)
         senders = [node.sender(topic.within(namespace)) for topic in outputs]
-        self._joints, self._imu, self._forces, self._pictures, self._compressed, self._truth = senders[:6]
-        self._lens_sender, self._description = senders[6:]
+        self._joints, self._imu, self._forces, self._description = senders
         self._description.publish(String(data=build_urdf(body)))
         self._late = 0  # answers that were not in when they were due, in the last second
         self._name = f"{namespace}: " if namespace else ""
@@ -118,13 +134,11 @@ class RobotPort:
         node.listen(topics.LEG_COMMAND.within(namespace), self._on_legs)
         node.listen(topics.HEAD_JOINT_COMMAND.within(namespace), self._on_head)
 
-    def begin_anew(self, seed: int | list[int]) -> None:
-        """Wait for the first command; the seed is that of the pictures' noise."""
-        self._rng = np.random.default_rng(seed)
+    def begin_anew(self) -> None:
+        """Wait for the first command."""
         self._asked: int | None = None  # stamp of the sensors whose answer is due
         self._answer: JointCommandMessage | None = None
         self._newest: tuple[JointState, Imu, FootForces] | None = None
-        self._lens_sender.publish(lens_to_message(self._lens, 0))
 
     def measure(self) -> None:
         """Read the sensors; their answer is due in the tick after this one."""
@@ -155,30 +169,12 @@ class RobotPort:
             self._answer = None
         self._asked = self._newest_stamp
 
-    def tell_truth(self, truth: Truth, verdict: Verdict) -> None:
-        """Publish what really is."""
-        self._truth.publish(truth_to_message(truth, verdict))
-
-    def take_picture(self) -> None:
-        """Publish what the camera sees."""
-        truth = self._node.world.truth(self._robot)
-        picture = self._camera.render(truth, self._rng)
-        self._pictures.publish(picture_to_message(picture, truth.stamp))
-        if self._compressed.get_subscription_count() > 0:
-            self._compressed.publish(jpeg_to_message(picture, truth.stamp))
-
     def _command_health(self) -> Finding | None:
         """Tell how the joints are commanded: too late, or not at all any more."""
         late, self._late = self._late, 0
-        silent = set(self._node.world.silent_joints(self._robot))
-        parts = [part for part, joints in (("legs", LEG_JOINTS), ("head", HEAD_JOINTS)) if silent & set(joints)]
-        if parts:
-            nodes = " and ".join({"legs": "motion", "head": "head"}[part] for part in parts)
-            return Finding(
-                Level.ERROR,
-                f"{self._name}commands of the {' and '.join(parts)} outlived their time-to-live, the joints are only"
-                f" damped or limp: look after {nodes}",
-            )
+        silent = silent_joints(self._node.world.silent_joints(self._robot), self._name)
+        if silent is not None:
+            return silent
         if not late:
             return None
         self._node.health.count("late answers", times=late)
@@ -207,21 +203,73 @@ class RobotPort:
             self._node.health.count("refused joint commands", f"joint command refused: {reason}")
 
 
+class RobotPort:
+    """One robot of the world: its joints, and its pictures and truth on topics."""
+
+    def __init__(
+        self, node: SimulatorNode, robot: int, namespace: str, camera: CameraParameters, joints: Joints
+    ) -> None:
+        """Connect.
+
+        Args:
+            node: Owns the world.
+            robot: Number in the world.
+            namespace: Of the robot's topics, below the node's own; "" for none.
+            camera: How the robot's camera sees.
+            joints: The way of its sensors and commands.
+        """
+        self._node, self._robot, self.joints = node, robot, joints
+        self._lens = head_camera_lens()
+        self._camera = CameraRenderer(camera, load_field(), load_robot(), self._lens)
+        outputs = (topics.CAMERA_IMAGE, topics.CAMERA_COMPRESSED, topics.GROUND_TRUTH, topics.CAMERA_INFO)
+        senders = [node.sender(topic.within(namespace)) for topic in outputs]
+        self._pictures, self._compressed, self._truth, self._lens_sender = senders
+
+    def begin_anew(self, seed: int | list[int]) -> None:
+        """Wait for the first command; the seed is that of the pictures' noise."""
+        self._rng = np.random.default_rng(seed)
+        self._lens_sender.publish(lens_to_message(self._lens, 0))
+        self.joints.begin_anew()
+
+    def tell_truth(self, truth: Truth, verdict: Verdict) -> None:
+        """Publish what really is."""
+        self._truth.publish(truth_to_message(truth, verdict))
+
+    def take_picture(self) -> None:
+        """Publish what the camera sees."""
+        truth = self._node.world.truth(self._robot)
+        picture = self._camera.render(truth, self._rng)
+        self._pictures.publish(picture_to_message(picture, truth.stamp))
+        if self._compressed.get_subscription_count() > 0:
+            self._compressed.publish(jpeg_to_message(picture, truth.stamp))
+
+
 class SimulatorNode(ComponentNode, ABC):
     """Owns a world and its time. Who inherits makes the world, and judges."""
 
     world: World
 
-    def prepare(self, settings: SimulatorParameters, robots: Sequence[tuple[str, CameraParameters]]) -> None:
+    def prepare(
+        self,
+        settings: SimulatorParameters,
+        robots: Sequence[tuple[str, CameraParameters]],
+        joints: Callable[[SimulatorNode, int, str], Joints] = TopicJoints,
+        tells_time: bool = True,
+    ) -> None:
         """Connect robots.
 
         Args:
             settings: How to run.
             robots: Namespace and camera of each, in the order of the world.
+            joints: Makes the way of a robot's sensors and commands, from the node, its number and namespace.
+            tells_time: Whether to send /clock.
         """
         self._pace_settings = settings
-        self._clock_sender = self.sender(topics.CLOCK)
-        self._ports = [RobotPort(self, index, *robot) for index, robot in enumerate(robots)]
+        self._clock_sender = self.sender(topics.CLOCK) if tells_time else None
+        self._ports = [
+            RobotPort(self, index, namespace, camera, joints(self, index, namespace))
+            for index, (namespace, camera) in enumerate(robots)
+        ]
 
     def begin_world(self, world: World, seeds: Sequence[int | list[int]]) -> None:
         """Begin anew with a world, and with the seeds of each robot's pictures."""
@@ -253,20 +301,21 @@ class SimulatorNode(ComponentNode, ABC):
             spin: Waits up to so many seconds [s] for messages and handles them.
         """
         for port in self._ports:
-            port.measure()
+            port.joints.measure()
         if self._tick == 0:
             self._await_nodes(spin)
         for port in self._ports:
-            port.send()
+            port.joints.send()
         spin(0.0)
         if self._waits:
             self._await_answers(spin)
         for port in self._ports:
-            port.obey()
+            port.joints.obey()
         self.world.advance(TICK)
         verdicts = self.judge(spin)
         if self._tick % SLOW_TICKS == 0:
-            self._clock_sender.publish(Clock(clock=to_message(self.world.stamp)))
+            if self._clock_sender is not None:
+                self._clock_sender.publish(Clock(clock=to_message(self.world.stamp)))
             for port, (truth, verdict) in zip(self._ports, verdicts, strict=True):
                 port.tell_truth(truth, verdict)
         if self._pace_settings.camera:
@@ -307,7 +356,7 @@ class SimulatorNode(ComponentNode, ABC):
         begin = time.monotonic()
         bound = p.answer_bound if self._started else p.start_bound
         repeat = begin + REPEAT
-        while not self.interrupted and not all(port.answered for port in self._ports):
+        while not self.interrupted and not all(port.joints.answered for port in self._ports):
             now = time.monotonic()
             if now - begin > bound:
                 # From here on time follows the wall clock, as it would on the robot, until answers come again.
@@ -317,14 +366,15 @@ class SimulatorNode(ComponentNode, ABC):
             if now > repeat:
                 # Motion control may have been restarted: what it missed would never be answered.
                 for port in self._ports:
-                    port.send()
+                    port.joints.send()
                 repeat = now + REPEAT
             spin(min(REPEAT, bound))
         self._started = self._started or self._tick > 0
 
     def _pace(self, spin: Spin) -> None:
         """Keep to the wall clock: never faster than `speed`, and without catching up when it was slower."""
-        speed = self._pace_settings.speed if self._waits else 1.0
+        wanted = self._pace_settings.speed
+        speed = wanted if self._waits or self._pace_settings.mode == "free" else 1.0
         if speed == 0.0:
             return
         wall, stamp = self._paced_from

@@ -114,12 +114,16 @@ class Trial:
 
 
 @contextmanager
-def running_trial(logs: Path, scenario: str = "open", seed: int = 1, **rules: float) -> Iterator[Trial]:
-    """Run a trial; afterwards no process and no shared memory of it may be left."""
+def running_trial(
+    logs: Path, scenario: str = "open", seed: int = 1, wire: bool = False, **rules: float
+) -> Iterator[Trial]:
+    """Run a trial, perhaps with the body behind a wire; afterwards no process and no shared memory may be left."""
     before = shared_memory()
-    values = {"driver": {"rules": {**SOON, **rules}}}
+    values: dict[str, dict[str, Any]] = {"emulator" if wire else "driver": {"rules": {**SOON, **rules}}}
+    if wire:
+        values["emulator"]["mode"] = "sync"  # a busy computer runs slower, not worse
     port = free_port()
-    plan = trial_plan(seed, scenario, values=values, referee_port=port)
+    plan = trial_plan(seed, scenario, values=values, referee_port=port, wire_port=free_port() if wire else None)
     pids: set[int] = set()
     with (
         Launcher(plan, logs) as launcher,

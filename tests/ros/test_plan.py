@@ -38,6 +38,13 @@ def test_only_a_simulated_robots_nodes_follow_the_clock():
     assert make_plan(["vision"], driver=None)[0].parameters["use_sim_time"] is False
 
 
+def test_anybodys_body_is_run_by_the_driver_node_on_the_computers_time():
+    driver, vision = make_plan(["vision"], driver="my_package.my_robot:MyRobot", values={"driver": {"clock": "host"}})
+    assert driver.name == "driver" and driver.entry.module == "tulip_driver.body_node"
+    assert driver.parameters["body"] == "my_package.my_robot:MyRobot"
+    assert vision.parameters["use_sim_time"] is False
+
+
 def test_both_forms_of_parameter_files_reach_the_node_and_later_layers_win(parameter_file, tmp_path: Path):
     text = """
     /**: {ros__parameters: {debug: false}}

@@ -30,6 +30,7 @@ SEED = 4
 WALKING = 8.0  # [s] the referee lets the robot play after 5: it has begun to walk then
 RECORDED = 3.0  # [s]
 NOT_IN_LOCKSTEP = {
+    topics.BATTERY,  # of real bodies
     topics.CAMERA_IMAGE,  # as JPEG only
     topics.VISION_PICTURE,
     topics.ROBOT_DESCRIPTION,

@@ -1,0 +1,174 @@
+"""The test kit: good bodies pass, and each kind of bad one fails in the line that names its fault."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bodies import ROBOT, VirtualBody
+
+from tulip_description.field import load_field
+from tulip_description.robot import JOINTS
+from tulip_description.robot_io import Battery, JointCommand, Sensors
+from tulip_driver.check.rows import Judgement, Row, verdict
+from tulip_driver.check.run import check_driver
+from tulip_driver.contract import Body, BodyError
+from tulip_driver.log_body import LogBody
+from tulip_sim.lockstep import Lockstep
+from tulip_sim.lockstep_recording import LockstepRecording
+from tulip_sim.scenario import make_scenario
+from tulip_sim.simulated_body import SimulatedBody
+
+KNEE = JOINTS.index("left_knee")
+
+
+def rows_of(body: Body, may_move: bool = True) -> list[Row]:
+    return list(check_driver(body, ROBOT, lambda: may_move))
+
+
+def failed(body: Body) -> set[str]:
+    return {row.what for row in rows_of(body) if row.judgement is Judgement.FAIL}
+
+
+class Changed(VirtualBody):
+    """Its readings are changed by a function of the reading and their number."""
+
+    def __init__(self, change: Any) -> None:
+        super().__init__()
+        self._change, self._count = change, 0
+
+    def exchange(self, command: JointCommand | None) -> Sensors:
+        self._count += 1
+        return self._change(super().exchange(command), self._count)
+
+
+def test_the_echo_body_passes_every_check() -> None:
+    rows = rows_of(VirtualBody())
+    assert verdict(rows)[0], [row for row in rows if row.judgement is Judgement.FAIL]
+    assert {row.what for row in rows} >= {*JOINTS, "limp: stiffness gone", "silence: damping", "garbage: NaN"}
+
+
+@pytest.mark.sim
+def test_the_simulated_robot_in_its_harness_passes_every_check() -> None:
+    rows = rows_of(SimulatedBody(ROBOT, harness=True))
+    assert verdict(rows)[0], [row for row in rows if row.judgement is Judgement.FAIL]
+
+
+@pytest.mark.sim
+def test_a_recording_passes_what_can_be_asked_of_it(tmp_path: Path) -> None:
+    recording = LockstepRecording(tmp_path / "log")
+    trial = Lockstep(make_scenario("open", np.random.default_rng(1), load_field()), 1, listener=recording.write)
+    while trial.stamp < 2.2e9:
+        trial.step()
+    trial.close()
+    recording.close()
+    rows = rows_of(LogBody(ROBOT, str(tmp_path / "log")))
+    assert verdict(rows)[0], rows
+    assert [row.what for row in rows if row.judgement is Judgement.SKIPPED][-1].startswith("joints")
+
+
+def in_degrees(reading: Sensors, _: int) -> Sensors:
+    return replace(reading, joint_positions=np.degrees(reading.joint_positions))
+
+
+def knee_reversed(reading: Sensors, _: int) -> Sensors:
+    velocity = reading.joint_velocities.copy()
+    velocity[KNEE] *= -1.0
+    return replace(reading, joint_velocities=velocity)
+
+
+def knees_swapped(reading: Sensors, _: int) -> Sensors:
+    order = list(range(14))
+    other = JOINTS.index("right_knee")
+    order[KNEE], order[other] = other, KNEE
+    return replace(reading, joint_positions=reading.joint_positions[order])
+
+
+def upside_down(reading: Sensors, _: int) -> Sensors:
+    return replace(reading, imu_linear_acceleration=-reading.imu_linear_acceleration)
+
+
+def in_kilograms(reading: Sensors, _: int) -> Sensors:
+    return replace(reading, foot_cells=reading.foot_cells * -0.1 - 20.0)
+
+
+def every_second(reading: Sensors, count: int) -> Sensors:
+    return replace(reading, stamp=reading.stamp - count % 2 * 4_000_000)
+
+
+def with_nan(reading: Sensors, count: int) -> Sensors:
+    return replace(reading, joint_efforts=np.full(14, np.nan)) if count % 100 == 0 else reading
+
+
+def empty(reading: Sensors, _: int) -> Sensors:
+    return replace(reading, battery=Battery(1.2), joint_temperatures=np.full(14, 300.0))
+
+
+@pytest.mark.parametrize(
+    ("change", "lines"),
+    [
+        (in_degrees, {"joint ranges"}),
+        (knee_reversed, {"left_knee"}),
+        (knees_swapped, {"left_knee", "right_knee"}),
+        (upside_down, {"IMU acceleration, levelled"}),
+        (in_kilograms, {"foot cells"}),
+        (every_second, {"rate"}),
+        (with_nan, {"readings"}),
+        (empty, {"battery", "temperatures"}),
+    ],
+)
+def test_a_fault_of_the_readings_fails_the_line_that_names_it(change: Any, lines: set[str]) -> None:
+    assert failed(Changed(change)) >= lines
+
+
+def test_a_reversed_joint_fails_alone() -> None:
+    assert failed(Changed(knee_reversed)) == {"left_knee"}
+
+
+def test_torque_that_stays_after_limp_fails() -> None:
+    def stuck(reading: Sensors, _: int) -> Sensors:
+        return replace(reading, joint_efforts=np.full(14, 4.0))
+
+    assert "limp: torque gone, measured" in failed(Changed(stuck))
+
+
+def test_a_body_that_falls_silent_fails_and_is_stopped() -> None:
+    class Silent(Changed):
+        stopped = False
+
+        def stop(self) -> None:
+            self.stopped = True
+
+    first: list[Sensors] = []
+
+    def freeze(reading: Sensors, count: int) -> Sensors:
+        first.append(reading)
+        return first[min(count, 1000) - 1]
+
+    body = Silent(freeze)
+    rows = rows_of(body)
+    assert rows[-1].measured == "the body fell silent for a second"
+    assert rows[-1].judgement is Judgement.FAIL
+    assert body.stopped
+
+
+def test_a_robot_that_may_not_move_is_told_nothing() -> None:
+    told: list[JointCommand | None] = []
+
+    class Listening(VirtualBody):
+        def exchange(self, command: JointCommand | None) -> Sensors:
+            told.append(command)
+            return super().exchange(command)
+
+    rows = rows_of(Listening(), may_move=False)
+    assert verdict(rows)[0]
+    assert set(told) == {None}
+
+
+def test_a_recording_without_sensors_is_refused_by_the_topics_that_it_lacks() -> None:
+    walk = Path(__file__).parents[1] / "data" / "recordings" / "walk"
+    with pytest.raises(BodyError, match="lacks /joint_states, /imu, /foot_forces"):
+        rows_of(LogBody(ROBOT, str(walk)))

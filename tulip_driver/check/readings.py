@@ -1,0 +1,114 @@
+"""Checks that move nothing: readings come in time, and are in the contract's units, signs and frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from tulip_description.quaternion import quaternion_matrix
+from tulip_description.robot import Robot
+from tulip_description.robot_io import Sensors
+from tulip_driver.check.rig import Rig, SilentError
+from tulip_driver.check.rows import Row, judged, skipped
+from tulip_driver.contract import PERIOD
+from tulip_motion.lipm import GRAVITY
+
+LISTEN = 2.0  # [s]
+RANGE_SLACK = 0.1  # [rad] beyond a joint's range, for the play of its stop
+
+
+def check_readings(rig: Rig) -> Iterator[Row]:
+    """Yield the lines about readings."""
+    try:
+        readings = rig.wait(LISTEN)
+    except SilentError:
+        readings = list(rig.readings)
+    if rig.loop.faults:
+        yield judged("readings", f"{rig.loop.faults} refused: {rig.loop.fault}", "finite, (14,) joints", False)
+    if len(readings) < 10:
+        yield judged("rate", f"{len(readings)} readings in {LISTEN:g} s", f"{1e9 / PERIOD:.0f} /s", False)
+        return
+    yield from check_times(readings, rig.late)
+    yield from check_units(readings, rig.robot)
+
+
+def check_times(readings: Sequence[Sensors], late: Sequence[float]) -> Iterator[Row]:
+    """Yield the lines about rate and jitter.
+
+    Args:
+        readings: In order.
+        late: How much later than asked for the computer itself woke up [s]; that is not the body's fault.
+    """
+    steps = np.diff([reading.stamp for reading in readings]) * 1e-9
+    period, excuse = PERIOD * 1e-9, float(np.quantile(late, 0.99)) if late else 0.0
+    rate, longest = 1.0 / float(np.median(steps)), float(np.quantile(steps, 0.99))
+    yield judged("rate", f"{rate:.1f} /s", f"{1 / period:.0f} /s +- 5%", abs(rate * period - 1.0) < 0.05)
+    words = f"99% within {longest * 1e3:.1f} ms" + (f" (computer late by {excuse * 1e3:.1f} ms)" if late else "")
+    yield judged("jitter of stamps", words, f"{2e3 * period:.0f} ms", longest <= 2.0 * period + excuse)
+    yield judged("stamps grow", f"least step {steps.min() * 1e3:.2f} ms", "> 0", bool(steps.min() > 0.0))
+
+
+def check_units(readings: Sequence[Sensors], robot: Robot) -> Iterator[Row]:
+    """Yield the lines about what the readings mean."""
+    positions = np.array([reading.joint_positions for reading in readings])
+    lower, upper = robot.position_limits
+    beyond = np.maximum(lower - positions.min(axis=0), positions.max(axis=0) - upper)
+    worst = int(beyond.argmax())
+    place = f"{beyond[worst]:.2f} rad beyond" if beyond[worst] > 0.0 else f"{-beyond[worst]:.2f} rad from its end"
+    yield judged(
+        "joint ranges",
+        f"{robot.joint_names[worst]} {place}",
+        f"at most {RANGE_SLACK} rad beyond",
+        bool(beyond[worst] <= RANGE_SLACK),
+    )
+    quaternions = np.array([reading.imu_orientation for reading in readings])
+    norm = float(np.linalg.norm(quaternions, axis=1).mean())
+    yield judged("IMU orientation", f"norm {norm:.3f}", "1 +- 0.01", abs(norm - 1.0) < 0.01)
+    force = np.mean(
+        [quaternion_matrix(reading.imu_orientation.tolist()) @ reading.imu_linear_acceleration for reading in readings],
+        axis=0,
+    )
+    off = float(np.linalg.norm(force - np.array([0.0, 0.0, GRAVITY])))
+    yield judged(
+        "IMU acceleration, levelled",
+        f"({force[0]:.2f}, {force[1]:.2f}, {force[2]:.2f}) m/s^2",
+        "(0, 0, +9.81) +- 1",
+        off < 1.0,
+    )
+    # Turning by the angular velocity in imu_link must be what the orientation does.
+    turned, told = _turns(readings)
+    miss = float(np.abs(turned - told).max())
+    yield judged("IMU angular velocity", f"differs by {miss:.3f} rad/s on average", "0.1", miss < 0.1)
+    cells = np.array([reading.foot_cells for reading in readings])
+    weight = robot.mass * GRAVITY
+    total = float(np.median(cells.sum(axis=(1, 2))))
+    yield judged(
+        "foot cells",
+        f"{total:.0f} N together, least {cells.min():.0f} N",
+        f"-10 N to 1.5 times the weight of {weight:.0f} N",
+        bool(cells.min() > -10.0 and total < 1.5 * weight),
+    )
+    newest = readings[-1]
+    if newest.joint_temperatures is None:
+        yield skipped("temperatures", "the body measures none")
+    else:
+        known = newest.joint_temperatures[np.isfinite(newest.joint_temperatures)]
+        hottest = float(known.max(initial=-273.0))
+        words = f"{len(known)} motors, at most {hottest:.0f} deg C"
+        yield judged("temperatures", words, "-20 to 120", bool(((-20.0 < known) & (known < 120.0)).all()))
+    if newest.battery is None:
+        yield skipped("battery", "the body does not tell")
+    else:
+        voltage = newest.battery.voltage
+        yield judged("battery", f"{voltage:.1f} V", "5 to 100 V", 5.0 < voltage < 100.0)
+
+
+def _turns(readings: Sequence[Sensors]) -> tuple[np.ndarray, np.ndarray]:
+    """Return (3,) mean angular velocity in imu_link by the orientations, and as measured [rad/s]."""
+    first, last = (quaternion_matrix(readings[i].imu_orientation.tolist()) for i in (0, -1))
+    change = first.T @ last
+    skew = (change - change.T) / 2.0
+    seconds = (readings[-1].stamp - readings[0].stamp) * 1e-9
+    turned = np.array([skew[2, 1], skew[0, 2], skew[1, 0]]) / seconds
+    return turned, np.mean([reading.imu_angular_velocity for reading in readings], axis=0)
