@@ -119,7 +119,7 @@ def test_a_walk_that_is_stopped_ends_with_the_feet_side_by_side() -> None:
 poses = st.builds(Pose2D, st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-math.pi, math.pi))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(poses, poses, st.integers(0, 2**31))
 def test_every_goal_is_reached_within_its_tolerance(start: Pose2D, goal: Pose2D, seed: int) -> None:
     walker = Walker(start, error=0.002, seed=seed)  # of the order of what the simulated feet miss by
@@ -131,7 +131,7 @@ def test_every_goal_is_reached_within_its_tolerance(start: Pose2D, goal: Pose2D,
     assert turned <= P.goal_tolerance_yaw
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(poses, poses)
 def test_steps_to_a_goal_stay_within_reach_and_the_feet_apart(start: Pose2D, goal: Pose2D) -> None:
     walker = Walker(start)

@@ -84,7 +84,7 @@ def test_derivatives_of_the_landmarks_angles_are_those_of_finite_differences() -
         assert np.allclose((after - before) / 2e-6, jacobian[:, :, column], atol=1e-5), column
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     x=st.floats(-4.0, 4.0),
     y=st.floats(-2.5, 2.5),

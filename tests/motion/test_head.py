@@ -63,7 +63,7 @@ modes = st.sampled_from(list(HeadMode))
 points = st.tuples(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0), st.floats(-0.5, 2.5))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     commands=st.lists(
         st.tuples(modes, points, st.one_of(st.none(), points), st.integers(1, 60)), min_size=1, max_size=6
@@ -172,7 +172,7 @@ def test_way_time_is_what_the_trajectory_needs() -> None:
         assert ticks * 0.002 == pytest.approx(time, abs=0.04)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(pan=st.floats(-2.3, 2.3), tilt=st.floats(-0.6, 1.2), distance=st.floats(0.5, 8.0))
 def test_point_ahead_of_angles_leads_back_to_them(pan: float, tilt: float, distance: float) -> None:
     geometry = HeadGeometry(ROBOT, 0.02)

@@ -168,7 +168,7 @@ def test_position_feedback_points_at_the_target_and_is_bounded(desired: list[flo
     np.testing.assert_allclose(rate, expected, atol=1e-12)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     st.floats(-0.05, 0.05), st.floats(-0.08, 0.08), st.floats(-0.04, 0.02), st.floats(-0.1, 0.1), st.floats(-0.3, 0.3)
 )
@@ -200,7 +200,7 @@ def levelled(joints: np.ndarray, stance: Side) -> np.ndarray:
     return result
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     st.sampled_from(Side),
     st.lists(st.floats(-1.0, 1.0), min_size=12, max_size=12),
@@ -334,7 +334,7 @@ def kinematics_com(kinematics: InverseKinematics) -> np.ndarray:
     return com
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.sampled_from(Side), st.integers(0, 2**32 - 1))
 def test_estimated_singular_value_settles_on_the_real_one(stance: Side, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -347,7 +347,7 @@ def test_estimated_singular_value_settles_on_the_real_one(stance: Side, seed: in
     assert kinematics.singular_value == pytest.approx(values[-1], rel=1e-3, abs=1e-4)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.sampled_from(Side), st.integers(0, 2**32 - 1))
 def test_no_posture_and_no_target_asks_for_more_than_the_joints_speed(stance: Side, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -205,7 +205,7 @@ def _sole(step: MirroredStep) -> Pose2D:
 velocities = st.tuples(st.floats(-0.4, 0.4), st.floats(-0.15, 0.15), st.floats(-0.4, 0.4))
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.lists(velocities, min_size=1, max_size=3))
 def test_the_whole_gait_is_continuous_and_ends_at_rest_between_the_feet(commands: list[Velocity]) -> None:
     ideal = Ideal()
@@ -231,7 +231,7 @@ def test_the_whole_gait_is_continuous_and_ends_at_rest_between_the_feet(commands
     np.testing.assert_allclose(beside.as_array(), [0.0, P.stance_width, 0.0], atol=1e-9)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(velocities)
 def test_feet_stay_apart_and_the_zmp_inside_the_stance_sole(velocity: Velocity) -> None:
     ideal = Ideal()

@@ -44,7 +44,7 @@ changes_of_landing = st.lists(
 ).map(sorted)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(changes_of_landing)
 def test_position_and_velocity_are_continuous_and_belong_together(
     changes: list[tuple[float, float, float, float]],
@@ -60,7 +60,7 @@ def test_position_and_velocity_are_continuous_and_belong_together(
         np.testing.assert_allclose(after.position, position, atol=1e-9)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(changes_of_landing)
 def test_the_sole_is_never_below_the_ground_before_it_lands(changes: list[tuple[float, float, float, float]]) -> None:
     motions, _ = swing(changes)
@@ -69,7 +69,7 @@ def test_the_sole_is_never_below_the_ground_before_it_lands(changes: list[tuple[
     assert heights.max() <= 1.05 * P.swing_height
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(changes_of_landing)
 def test_it_arrives_at_the_last_target_at_rest(changes: list[tuple[float, float, float, float]]) -> None:
     motions, left = swing(changes)

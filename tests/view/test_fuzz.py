@@ -17,9 +17,7 @@ from tulip_view.fuzz.inputs import KINDS, Kind, WrongError
 
 EXAMPLES = 60
 kinds = pytest.mark.parametrize("kind", KINDS, ids=[kind.name for kind in KINDS])
-bounded = settings(
-    derandomize=True, max_examples=EXAMPLES, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+bounded = settings(derandomize=True, max_examples=EXAMPLES, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @kinds

@@ -39,7 +39,7 @@ def field_colours(width: int, height: int, seed: int) -> np.ndarray:
     return np.clip(picture + rng.normal(0.0, 6.0, picture.shape), 0, 255).astype(np.uint8)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     width=st.integers(SMALLEST, 330),
     height=st.integers(SMALLEST, 250),
@@ -63,7 +63,7 @@ def test_lenses_of_pictures_too_small_to_show_anything_are_refused(width: int, h
         Vision(VisionParameters(), lens_of(width, height, "plumb_bob"))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(channels=st.sampled_from([0, 1, 2, 4, 5]), type_=st.sampled_from([np.uint8, np.uint16, np.float32, np.bool_]))
 def test_pictures_with_another_number_of_channels_or_type_are_refused_by_name(channels: int, type_: type) -> None:
     lens = lens_of(64, 48, "plumb_bob")

@@ -65,7 +65,7 @@ ANY_MODEL = st.one_of(
 )
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(ANY_MODEL, st.floats(150.0, 900.0), st.floats(0.9, 1.1), small(20.0), small(20.0), st.integers(0, 2**32 - 1))
 def test_pixels_that_see_anything_return_to_themselves_with_any_lens(
     model: tuple[str, tuple[float, ...]], focal: float, aspect: float, right: float, down: float, seed: int

@@ -297,7 +297,7 @@ balls = st.builds(
 moves = st.builds(Increment, st.just(Pose2D()), st.floats(0.0, 0.5), st.floats(0.0, 0.5), st.floats(0.01, 2.0))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(steps=st.lists(st.tuples(moves, st.lists(balls, max_size=3)), min_size=1, max_size=12))
 def test_covariance_stays_symmetric_and_positive_semidefinite_whatever_is_seen(steps) -> None:
     ball = BallFilter(BallParameters(), RADIUS)

@@ -47,7 +47,7 @@ def misfits_of(state: np.ndarray, ends: np.ndarray, lines: Lines) -> tuple[np.nd
     return line_misfits(state, ends, CAMERA, lines.directions, lines.starts)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(state=states, place=st.tuples(st.floats(-5.0, 5.0), st.floats(-4.0, 4.0)))
 def test_jacobian_of_point_directions_agrees_with_finite_differences(state, place) -> None:
     points = np.array([place])
@@ -60,7 +60,7 @@ def test_jacobian_of_point_directions_agrees_with_finite_differences(state, plac
     assert np.allclose(jacobian[0], expected, rtol=1e-5, atol=1e-6)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     state=states,
     ends=st.tuples(st.floats(-2.0, 2.0), st.floats(-1.2, -0.2), st.floats(0.1, 1.0), st.floats(-1.2, -0.2)),

@@ -199,7 +199,7 @@ moves = st.builds(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(steps=st.lists(st.tuples(moves, st.lists(anything, max_size=6)), min_size=1, max_size=6))
 def test_covariance_stays_symmetric_and_positive_semidefinite_whatever_is_seen(steps) -> None:
     localization = Localization(LocalizationParameters(), FIELD, START)

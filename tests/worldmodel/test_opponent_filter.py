@@ -163,7 +163,7 @@ def test_assignment_uses_every_object_and_sighting_once_at_most(distances) -> No
 places = st.lists(st.tuples(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0)), max_size=6)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(pictures=st.lists(places, min_size=1, max_size=10))
 def test_number_stays_bounded_and_covariances_positive_semidefinite_whatever_is_seen(pictures) -> None:
     opponents = OpponentFilter(OpponentParameters())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from synthetic import com_by_pinocchio
 
@@ -31,7 +31,6 @@ def test_trunk_gives_three_moments_each_joint_two_and_all_masses_one(robot: obje
     assert len(base_parameters(robot).names) == 3 + 2 * joints + 1  # type: ignore[arg-type]
 
 
-@settings(deadline=None)
 @given(st.sampled_from(VARIANTS), st.sampled_from(["left", "right"]), st.integers(0, 2**32 - 1))
 def test_reduced_rows_times_base_parameters_give_pinocchios_com_in_all_three_axes(
     variant: str, side: Side, seed: int
@@ -45,7 +44,6 @@ def test_reduced_rows_times_base_parameters_give_pinocchios_com_in_all_three_axe
     assert found == pytest.approx(com_by_pinocchio(robot, side, joints), abs=1e-12)
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.randoms(use_true_random=False))
 def test_columns_in_another_order_and_other_postures_give_the_same_combinations(seed: int, random: object) -> None:
     expected = base_parameters(ROBOT)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tulip_description.body_file import Body, BodyFileError, BodySource, links_of, read_body, write_body
@@ -38,7 +38,6 @@ def body_of(seed: int) -> Body:
     )
 
 
-@settings(deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_body_is_read_as_it_was_written_to_the_last_digit(tmp_path_factory: Any, seed: int) -> None:
     path, body = tmp_path_factory.mktemp("body") / "new" / "body.yaml", body_of(seed)

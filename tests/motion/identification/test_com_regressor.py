@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from synthetic import base_rotation, com_by_pinocchio
 
@@ -18,7 +18,6 @@ SIDES = st.sampled_from(["left", "right"])
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-@settings(deadline=None)
 @given(st.sampled_from(VARIANTS), SIDES, SEEDS)
 def test_regressor_times_parameters_is_pinocchios_com_on_random_bodies_and_postures(
     variant: str, side: Side, seed: int
@@ -30,7 +29,6 @@ def test_regressor_times_parameters_is_pinocchios_com_on_random_bodies_and_postu
     assert found == pytest.approx(com_by_pinocchio(robot, side, joints), abs=1e-12)
 
 
-@settings(deadline=None)
 @given(SIDES, SEEDS)
 def test_cop_lies_on_the_sole_below_the_com_along_gravity(side: Side, seed: int) -> None:
     robot, rng = load_robot(), np.random.default_rng(seed)
@@ -44,7 +42,6 @@ def test_cop_lies_on_the_sole_below_the_com_along_gravity(side: Side, seed: int)
     assert rows @ standard_parameters(robot) == pytest.approx(on_sole[:2], abs=1e-12)
 
 
-@settings(deadline=None)
 @given(SIDES, SEEDS)
 def test_change_of_slope_by_the_imus_mounting_equals_finite_differences(side: Side, seed: int) -> None:
     robot, rng = load_robot(), np.random.default_rng(seed)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import chi2
 from synthetic import Held, com_by_pinocchio, measure
@@ -26,7 +26,6 @@ ROBOT = load_robot()
 NUMBERS = st.floats(-1.0, 1.0)
 
 
-@settings(deadline=None)
 @given(st.floats(0.1, 10.0), st.tuples(NUMBERS, NUMBERS, NUMBERS), st.tuples(*[st.floats(0.01, 1.0)] * 3))
 def test_pseudo_inertia_of_six_masses_is_the_sum_of_their_products(
     mass: float, com: tuple[float, float, float], half: tuple[float, float, float]
@@ -39,7 +38,6 @@ def test_pseudo_inertia_of_six_masses_is_the_sum_of_their_products(
     assert why_impossible(mass, com, inertia) == ""  # type: ignore[arg-type]
 
 
-@settings(deadline=None)
 @given(st.floats(-1.0, 1.0), st.tuples(NUMBERS, NUMBERS, NUMBERS), st.tuples(*[st.floats(-0.1, 1.0)] * 3))
 def test_a_body_is_refused_exactly_if_its_pseudo_inertia_is_not_positive_definite(
     mass: float, com: tuple[float, float, float], inertia: tuple[float, float, float]
@@ -65,7 +63,6 @@ def test_reasons_why_a_body_cannot_be(mass: float, inertia: tuple[float, float, 
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-@settings(deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_secretly_changed_bodies_can_be_and_stay_within_their_bounds(variant: str, seed: int) -> None:
     believed = load_robot(variant)
