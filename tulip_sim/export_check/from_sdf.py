@@ -34,7 +34,7 @@ def sdf_figures(path: Path) -> Figures:
     log = logging.getLogger("drake")
     handlers, log.handlers, propagates, log.propagate = log.handlers, [heard], log.propagate, False
     try:
-        Parser(plant).AddModels(str(path))
+        Parser(plant).AddModels(path)
     except RuntimeError as error:
         raise SdfError(f"{path}: {error}") from error
     finally:
