@@ -107,16 +107,20 @@ def summarize(rows: list[Row]) -> list[str]:
                 f" | {max(row['greatest torque by limit'] for row in own):.2f}"
                 f" | {min(ways):.2f} m, {np.median(ways):.2f} m |"
             )
-    wanted = kick.WANTED[KickKind.FORWARD]
-    lines += [
+    kicks = [row for row in rows if row["task"] == KICK]
+    return lines + _summarize_kicks(kicks) if kicks else lines
+
+
+def _summarize_kicks(rows: list[Row]) -> list[str]:
+    lines = [
         "",
-        f"The same for the forward kick from standing, {wanted} m/s wanted.",
+        f"The same for the forward kick from standing, {kick.WANTED[KickKind.FORWARD]} m/s wanted.",
         "",
         "| engine | upright | ball speed: least, median, most | direction error: median, most |",
         "| --- | --- | --- | --- |",
     ]
     for engine in ENGINES:
-        own = [row for row in rows if (row["task"], row["engine"]) == (KICK, engine)]
+        own = [row for row in rows if row["engine"] == engine]
         if own:
             speeds = [row["ball speed [m/s]"] for row in own]
             errors = [abs(row["direction error [deg]"]) for row in own]
