@@ -62,6 +62,7 @@ class WireJoints(Joints):
         """Wait for the first command."""
         self._asked: int | None = None
         self._answer = -1  # stamp of the newest sensors that were answered
+        self._server.begin_anew()
 
     def measure(self) -> None:
         """Read the sensors."""

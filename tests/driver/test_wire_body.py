@@ -113,6 +113,7 @@ class TestServer:
 
     def setup_method(self) -> None:
         self.pipe = Pipe(VirtualBody())
+        self.pipe.live()
 
     def give(self, kind: Kind, sequence: int, data: bytes | None = None) -> np.ndarray | None:
         frames = command_frames(command(position=0.1, stiffness=1.0), JOINTS)
@@ -133,6 +134,16 @@ class TestServer:
         assert self.pipe.server.refused == {"stale packets": 2}
         self.give(Kind.HELLO, 1)
         assert self.give(Kind.COMMAND, 2) is not None
+
+    def test_an_answer_to_a_reading_that_was_never_sent_is_from_another_time(self) -> None:
+        self.give(Kind.HELLO, 1)
+        frames = command_frames(command(), JOINTS)
+        stamp = self.pipe.live().stamp
+        assert self.give(Kind.COMMAND, 2, encode(Packet(Kind.COMMAND, 2, stamp + 1, frames))) is None
+        assert self.give(Kind.COMMAND, 3, encode(Packet(Kind.COMMAND, 3, stamp, frames))) is not None
+        self.pipe.server.begin_anew()
+        assert self.give(Kind.COMMAND, 4, encode(Packet(Kind.COMMAND, 4, stamp, frames))) is None
+        assert self.pipe.server.refused == {"answers to readings of another time": 2}
 
     def test_a_stop_takes_all_torque_from_all_joints(self) -> None:
         self.give(Kind.HELLO, 1)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bodies import ROBOT, VirtualBody, command
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -166,6 +166,7 @@ def test_another_robot_is_told_by_its_number_of_joints_or_their_names() -> None:
         check_identity(Packet(Kind.IDENTITY, 1, 0, identity_frames((*names[1:], names[0]))), names)
 
 
+@settings(max_examples=30)
 @given(st.binary(max_size=60), st.binary(max_size=60), st.integers(1, 97))
 def test_a_stream_gives_every_packet_out_of_noise_and_pieces(before: bytes, between: bytes, piece: int) -> None:
     # Noise that looks like the beginning of a long packet may hold up what follows until more bytes come.

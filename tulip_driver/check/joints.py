@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_description.robot_io import Sensors
 from tulip_driver.check.rig import Rig
 from tulip_driver.check.rows import Row, judged
+from tulip_driver.contract import PERIOD
 
 Array = NDArray[np.float64]
 SWAY = 0.05  # [rad] 3 degrees
@@ -46,9 +48,7 @@ def _check_joint(rig: Rig, name: str, joint: int, home: Array, way: Array) -> Ro
     out = rig.hold(RAMP, lambda passed: home + way * _smooth(passed / RAMP))
     out += rig.hold(REST, lambda _: home + way)
     change = np.mean([reading.joint_positions for reading in out[-10:]], axis=0) - start
-    stamps = np.array([reading.stamp for reading in out]) * 1e-9
-    speeds = np.array([reading.joint_velocities[joint] for reading in out])
-    driven = float(speeds[1:] @ np.diff(stamps)) / change[joint] if abs(change[joint]) > 0.2 * SWAY else float("nan")
+    driven = _driven(out, joint)
     rig.hold(RAMP, lambda passed: home + way * (1.0 - _smooth(passed / RAMP)))
     most = rig.robot.joint_names[int(np.abs(change).argmax())]
     moved = change[joint] / way[joint]
@@ -57,6 +57,19 @@ def _check_joint(rig: Rig, name: str, joint: int, home: Array, way: Array) -> Ro
         words += f"; {most} moved more"
     well = 0.5 < moved < 1.5 and 0.6 < driven < 1.4 and 0.1 < torque < 2.0 and most == name
     return judged(name, words, "0.5 to 1.5, x0.6 to 1.4, x0.1 to 2", bool(well))
+
+
+def _driven(readings: Sequence[Sensors], joint: int) -> float:
+    """Return how far a joint went by its velocities, as a share of how far it went; NaN if it did not move.
+
+    Where readings are missing in between, neither counts.
+    """
+    steps = np.diff([reading.stamp for reading in readings])
+    moves = np.diff([reading.joint_positions[joint] for reading in readings])
+    speeds = np.array([reading.joint_velocities[joint] for reading in readings[1:]])
+    whole = steps < 1.5 * PERIOD
+    way = float(moves[whole].sum())
+    return float(speeds[whole] @ steps[whole]) * 1e-9 / way if abs(way) > 0.2 * SWAY else float("nan")
 
 
 def _smooth(share: float) -> float:

@@ -70,6 +70,7 @@ class Rig:
     Attributes:
         loop: The driver's part.
         readings: All new ones since they were last cleared.
+        arrivals: When each of them came [ns], in the driver's time.
         late: How much later than asked for the computer woke up before each exchange [s].
     """
 
@@ -84,6 +85,7 @@ class Rig:
         self._longest = 0.0  # [s] of wall-clock time between two readings
         self._sequence = 0
         self.readings: list[Sensors] = []
+        self.arrivals: list[int] = []
         self.late: list[float] = []
         self._groups = [names for names in (LEG_JOINTS, HEAD_JOINTS) if set(names) <= set(robot.joint_names)]
         self._index = {name: index for index, name in enumerate(robot.joint_names)}
@@ -103,6 +105,7 @@ class Rig:
         now = time.monotonic()
         if reading is not None:
             self.readings.append(reading)
+            self.arrivals.append(self.loop.now)
             self._longest = max(self._longest, now - self._heard)
             self._heard = now
         elif now - self._heard > SILENCE or (flag(self.body, "simulated") and not flag(self.body, "moves")):
@@ -112,6 +115,7 @@ class Rig:
     def begin(self) -> None:
         """Forget what was written down."""
         self.readings.clear()
+        self.arrivals.clear()
         self.late.clear()
         self.probe.told.clear()
         self._heard = time.monotonic()

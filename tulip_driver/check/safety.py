@@ -99,10 +99,12 @@ def check_limp(rig: Rig, home: Array) -> Iterator[Row]:
     first = min(told, default=float("inf"))
     yield judged("limp: stiffness gone", f"after {first:.1f} ms", f"{LIMP_WITHIN:.0f} ms", first <= LIMP_WITHIN)
     limits = FREE * rig.robot.effort_limits
-    slack = [
-        (reading.stamp - begin) / MILLISECOND for reading in readings if (np.abs(reading.joint_efforts) > limits).any()
+    still = [
+        (arrival - begin) / MILLISECOND
+        for arrival, reading in zip(rig.arrivals, readings, strict=True)
+        if (np.abs(reading.joint_efforts) > limits).any()
     ]
-    last = max(slack, default=0.0)
+    last = max(still, default=0.0)
     yield judged(
         "limp: torque gone, measured", f"after {last:.1f} ms", f"{DAMPED_WITHIN:.0f} ms", last <= DAMPED_WITHIN
     )

@@ -64,6 +64,10 @@ class WireServer:
                 self._taken += 1
                 return replace(command, sequence=self._taken)
 
+    def begin_anew(self) -> None:
+        """The body's time begins anew: until the next reading was sent, no command can be an answer."""
+        self._newest = None
+
     def send(self, sensors: Sensors) -> None:
         """Send a reading."""
         self._newest = sensors
@@ -83,6 +87,8 @@ class WireServer:
                 self._refuse("packets of a stranger")
             elif packet.sequence <= self._heard:
                 self._refuse("stale packets")
+            elif packet.kind is Kind.COMMAND and (self._newest is None or packet.stamp > self._newest.stamp):
+                self._refuse("answers to readings of another time")  # this body's time began anew
             elif packet.kind is Kind.COMMAND:
                 command = command_of(packet, self._names)
                 self._heard = packet.sequence
