@@ -16,7 +16,7 @@ SEGMENT = 17 * 2**20  # [B] one process's shared memory: 16 MiB of messages and 
 PROCESSES = 12  # of one robot's graph with tools
 NAMES = ("auto", "shared_memory", "udp")
 RANGE_VARIABLE, RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"
-"""How far nodes look for others, and are found: DDS knows no password, so this machine alone unless the user says so."""
+"""How far nodes look for others, and are found: DDS knows no password, so this machine alone by default."""
 
 
 def profile_path(name: str = "auto") -> Path:
