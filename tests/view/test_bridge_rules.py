@@ -117,3 +117,9 @@ def test_port_is_checked():
 def test_a_name_that_ros_would_not_take_is_refused_in_words(namespace: str):
     refusal = why_not_publish(f"{namespace}/user_wish", "tulip_msgs/msg/UserCommand", "cdr")
     assert "is no name of a topic" in refusal
+
+
+def test_what_a_stranger_says_does_not_steer_the_terminal_that_shows_it():
+    with pytest.raises(RefusedError) as refused:
+        admit(request("http://\x1b[2Jevil.example"))
+    assert str(refused.value).isprintable() and "evil.example" in str(refused.value)
