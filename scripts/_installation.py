@@ -230,7 +230,7 @@ def variables(values: Mapping[str, str]) -> Iterator[Found]:
     found = list(_disturbing(values))
     yield from found
     if not found:
-        domain, reach = values.get("ROS_DOMAIN_ID", "0"), values.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
+        domain, reach = values.get("ROS_DOMAIN_ID", "0"), values.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         yield Found(OK, "ROS variables", f"domain {domain}, discovery range {reach}")
 
 

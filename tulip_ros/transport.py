@@ -15,6 +15,8 @@ SHARED_MEMORY = Path("/dev/shm")
 SEGMENT = 17 * 2**20  # [B] one process's shared memory: 16 MiB of messages and what Fast DDS adds
 PROCESSES = 12  # of one robot's graph with tools
 NAMES = ("auto", "shared_memory", "udp")
+RANGE_VARIABLE, RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"
+"""How far nodes look for others, and are found: DDS knows no password, so this machine alone by default."""
 
 
 def profile_path(name: str = "auto") -> Path:
@@ -35,8 +37,12 @@ def profile_path(name: str = "auto") -> Path:
 
 
 def use_profile(name: str = "auto") -> None:
-    """Make this process and its children use a profile, unless the user's environment names one already."""
+    """Make this process and its children use a profile, and stay on this machine.
+
+    What the user's environment says already is left as it is.
+    """
     os.environ.setdefault(PROFILE_VARIABLE, str(profile_path(name)))
+    os.environ.setdefault(RANGE_VARIABLE, RANGE)
 
 
 def remove_leftovers() -> None:

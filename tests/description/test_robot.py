@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import tulip_description
 from tulip_description.camera_pose import camera_in_footprint
 from tulip_description.model import floating_model, joint_indices, sole_model
 from tulip_description.posture import standing_posture
@@ -210,3 +211,12 @@ def test_wrong_parameter_files_are_refused_with_the_place(tmp_path: Path, old: s
     with pytest.raises(ValueError, match=message) as error:
         load_robot(path=path)
     assert str(path) in str(error.value)
+
+
+@pytest.mark.parametrize("number", [".nan", ".inf", "1" + "0" * 400])
+def test_a_mass_that_is_no_finite_number_is_refused(number: str, tmp_path: Path):
+    text = Path(str(tulip_description.__file__)).with_name("robot.yaml").read_text()
+    assert "mass: 8.154" in text
+    (tmp_path / "robot.yaml").write_text(text.replace("mass: 8.154", f"mass: {number}"))
+    with pytest.raises(ValueError, match=r"mass|64 bits"):
+        load_robot(path=tmp_path / "robot.yaml")

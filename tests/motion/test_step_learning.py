@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from tulip_description.planar import Pose2D
 from tulip_description.robot import load_robot
 from tulip_motion.interface import MotionMode, Side, Support
 from tulip_motion.iterative_learning import AdaptiveLaw, WaveformLaw, mirrored, nodes_of, on_nodes, smoother
-from tulip_motion.learning_file import LearningFile
+from tulip_motion.learning_file import LARGEST, LearningFile, LearningFileError, load
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.step_learning import StepLearner, key_of, mirror_key
 from tulip_sim.bench.body import Body
@@ -350,3 +351,13 @@ def test_a_walking_robot_halves_its_joint_errors_and_has_no_learned_torque_once_
     plain = Body(1, Pose2D(-4.0, 2.2, 0.0))
     plain.go(4.0, STILL)
     assert error_over_a_second(body) < 0.6 * error_over_a_second(plain)
+
+
+def test_a_file_that_holds_more_than_was_ever_learned_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
+    path = tmp_path / "learned.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in ("version", "owner", "keys", "memories", "baselines"):
+            archive.writestr(f"{name}.npy", bytes(LARGEST))
+    assert path.stat().st_size < LARGEST // 100
+    with pytest.raises(LearningFileError, match="expected at most"):
+        load(path, {}, (12, 5))

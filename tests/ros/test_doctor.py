@@ -28,7 +28,7 @@ def levels(found: list[Found]) -> set[str]:
 @pytest.mark.parametrize(
     ("variables", "level", "words"),
     [
-        ({}, OK, "domain 0, discovery range SUBNET"),
+        ({}, OK, "domain 0, discovery range LOCALHOST"),
         ({"ROS_DOMAIN_ID": "32", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, OK, "domain 32"),
         ({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}, ERROR, "only rmw_fastrtps_cpp is installed: unset it"),
         ({"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}, OK, "domain 0"),

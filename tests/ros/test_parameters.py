@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -10,6 +11,8 @@ import pytest
 from tulip_ros import parameters
 from tulip_ros.errors import BadInputError
 from tulip_ros.run import ComponentNode, session
+from tulip_strategy.game_input import GameInputParameters
+from tulip_strategy.user_input import UserInputParameters
 
 
 class Foot(Enum):
@@ -105,3 +108,11 @@ def test_malformed_arguments_are_bad_input(ros_domain: int, tmp_path):
     arguments = ["test", "--ros-args", "--params-file", str(file)]
     with pytest.raises(BadInputError, match=r"bad\.yaml"), session(lambda: ComponentNode("walk"), arguments=arguments):
         pass
+
+
+@pytest.mark.parametrize("value", [math.nan, [0.1, math.nan, 0.1]])
+def test_nan_is_no_number(value: object):
+    name = "stale_after" if isinstance(value, float) else "walk_test_limits"
+    defaults = GameInputParameters() if isinstance(value, float) else UserInputParameters()
+    with pytest.raises(BadInputError, match="expected a"):
+        parameters.replace(defaults, {name: value}, "node")

@@ -95,3 +95,13 @@ def test_unusable_parameter_files_are_refused(parameter_file, text: str, message
 
 def test_empty_parameter_file_changes_nothing(parameter_file):
     assert read_parameters(parameter_file("# nothing\n")) == {}
+
+
+def test_a_block_takes_the_place_of_a_value(parameter_file):
+    [start] = make_plan(["motion"], None, "", [parameter_file("motion: {gait: dcm, gait.step_time: 0.4}")])
+    assert start.parameters["gait"] == {"step_time": 0.4}
+
+
+def test_names_of_more_parts_than_any_parameter_are_refused(parameter_file):
+    with pytest.raises(BadInputError, match="too many parts"):
+        make_plan(["motion"], None, "", [parameter_file(f"motion: {{{'.'.join('a' * 400)}: 1}}")])

@@ -111,3 +111,15 @@ def test_only_what_people_say_may_be_published():
 def test_port_is_checked():
     with pytest.raises(ValueError, match="port is -1; expected 0 to 65535"):
         BridgeParameters(port=-1)
+
+
+@pytest.mark.parametrize("namespace", ["/a b", "/", "/3x", "/{x}", "/motion\0", "/\ud800", "/a\n", "/" + "a" * 300])
+def test_a_name_that_ros_would_not_take_is_refused_in_words(namespace: str):
+    refusal = why_not_publish(f"{namespace}/user_wish", "tulip_msgs/msg/UserCommand", "cdr")
+    assert "is no name of a topic" in refusal
+
+
+def test_what_a_stranger_says_does_not_steer_the_terminal_that_shows_it():
+    with pytest.raises(RefusedError) as refused:
+        admit(request("http://\x1b[2Jevil.example"))
+    assert str(refused.value).isprintable() and "evil.example" in str(refused.value)

@@ -93,6 +93,7 @@ def test_a_malformed_message_ends_its_sender_and_nobody_else(
         (f"http://{socket.gethostname()}:8080", True, True),
         ("http://robot.evil.example:8080", True, False),
         ("null", False, False),
+        ("http://[evil", True, False),  # no address at all
     ],
 )
 def test_only_addresses_of_this_machine_are_own(origin: str | None, lan: bool, own: bool):

@@ -22,6 +22,8 @@ from tulip_worldmodel.messages import (
     features_from_message,
     map_to_odom_message,
     robot_pose_to_message,
+    start_pose_from_message,
+    start_pose_to_message,
     world_state_to_message,
 )
 from tulip_worldmodel.world_model import WorldModel, WorldModelParameters
@@ -160,3 +162,15 @@ def test_camera_of_the_simulation_is_as_high_as_that_of_the_standing_robot() -> 
     robot = load_robot()
     transform = camera_in_footprint(robot, standing_posture(robot).base_height, (0.0, 0.0, 0.0, 1.0), 0.0, 0.4)
     assert transform[2, 3] == pytest.approx(CAMERA[2], abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("x", "w"), [(math.nan, 1.0), (math.inf, 1.0), (1e9, 1.0), (0.0, math.nan), (0.0, 1e200), (0.0, 0.0), (0.0, 1e-300)]
+)
+def test_a_start_pose_that_is_none_is_refused(x: float, w: float) -> None:
+    message = start_pose_to_message(Pose2D(1.0, 2.0, 0.5), 0)
+    assert start_pose_from_message(message) == pytest.approx(Pose2D(1.0, 2.0, 0.5))
+    message.pose.pose.position.x = x
+    turn = message.pose.pose.orientation
+    turn.z, turn.w = turn.z * w, turn.w * w
+    assert start_pose_from_message(message) is None

@@ -84,15 +84,15 @@ def admit(head: bytes, origins: Collection[str] = ()) -> Admission:
     if page is not None and not _may_ask(page, origins):
         raise RefusedError(
             HTTPStatus.FORBIDDEN,
-            f"The page of {page} may not control this robot; pages of this machine and Foxglove's may. "
-            f"To let it in, start the bridge with --origin {page}",
+            f"The page of {_shown(page)} may not control this robot; pages of this machine and Foxglove's may. "
+            f"To let it in, start the bridge with --origin {_shown(page)}",
         )
     named = [name.strip() for value in lines.get_all(PROTOCOL, []) for name in value.split(",")]
     name = next((known for known in (CURRENT, OLDER) if known in named), None)
     if name is None:
         raise RefusedError(
             HTTPStatus.BAD_REQUEST,
-            f"Sub-protocol is {', '.join(named) or 'not named'}; expected {CURRENT}, or {OLDER} of older viewers.",
+            f"Sub-protocol is {_shown(', '.join(named)) or 'not named'}; expected {CURRENT}, or {OLDER} of older viewers.",
         )
     return Admission(_renamed(first, lines, CURRENT), name)
 
@@ -120,6 +120,11 @@ def _may_ask(page: str, origins: Collection[str]) -> bool:
         return is_loopback(urlsplit(page).hostname)
     except ValueError:  # no address at all
         return False
+
+
+def _shown(words: str) -> str:
+    """Return a stranger's words so that they cannot pass for lines of a log, or steer a terminal."""
+    return words[:200] if words.isprintable() else repr(words[:200])
 
 
 def _split(head: bytes) -> tuple[str, http.client.HTTPMessage]:

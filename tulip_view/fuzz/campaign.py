@@ -11,6 +11,7 @@ import signal
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Set
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -110,13 +111,14 @@ def read(kind: Kind, number: int, data: bytes, folder: Path, result: Result) -> 
 def run(kind: Kind, count: int) -> Result:
     """Read so many inputs, whatever they do to the process that reads them."""
     whole, first = Result(), 0
+    fatal: set[int] = set()
     context = multiprocessing.get_context("fork")
     current = context.Value("q", 0, lock=False)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         while first < count:
             ours, theirs = context.Pipe(duplex=False)
-            child = context.Process(target=_child, args=(kind, first, count, folder, theirs, current))
+            child = context.Process(target=_child, args=(kind, range(first, count), fatal, folder, theirs, current))
             child.start()
             theirs.close()
             try:
@@ -129,16 +131,15 @@ def run(kind: Kind, count: int) -> Result:
             if hangs:
                 child.kill()
             child.join()
-            if first < count:
-                # What it read since its last report is read anew, but for the input that ended it.
-                for number in range(first, current.value):
-                    read(kind, number, made(kind, number), _place(folder), whole)
+            if first < count:  # what it read since its last report is read anew, but for what ended it
                 whole.fail(current.value, "hang beyond signals" if hangs else f"process ended ({child.exitcode})")
-                first = current.value + 1
+                fatal.add(current.value)
     return whole
 
 
-def _child(kind: Kind, first: int, count: int, folder: Path, connection: Connection, current: object) -> NoReturn:
+def _child(
+    kind: Kind, numbers: range, fatal: Set[int], folder: Path, connection: Connection, current: object
+) -> NoReturn:
     """Read inputs and report on them; never returns."""
     signal.signal(signal.SIGPROF, _too_long)
     pages = int(Path("/proc/self/statm").read_text().split()[0])
@@ -150,16 +151,17 @@ def _child(kind: Kind, first: int, count: int, folder: Path, connection: Connect
     os.dup2(silent, 2)  # libraries complain there of what they meet
     begin = _memory()
     result = Result()
-    for number in range(first, count):
+    for number in numbers:
         current.value = number  # type: ignore[attr-defined]  # a shared number, of no class that can be named
-        data = made(kind, number)
-        signal.setitimer(signal.ITIMER_PROF, LONGEST)
-        try:
-            read(kind, number, data, _place(folder), result)
-            signal.setitimer(signal.ITIMER_PROF, 0.0)
-        except HangError:  # just when it was read
-            pass
-        if (number + 1 - first) % STEP == 0 or number + 1 == count:
+        if number not in fatal:
+            data = made(kind, number)
+            try:
+                signal.setitimer(signal.ITIMER_PROF, LONGEST)
+                read(kind, number, data, _place(folder), result)
+                signal.setitimer(signal.ITIMER_PROF, 0.0)
+            except HangError:  # just when it was read
+                pass
+        if (number + 1) % STEP == 0 or number + 1 == numbers.stop:
             result.memory = max(0.0, _memory() - begin)
             connection.send((result, number + 1))
             result = Result()

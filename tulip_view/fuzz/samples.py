@@ -149,7 +149,9 @@ def parameter_files() -> tuple[bytes, ...]:
 def learning_files() -> tuple[bytes, ...]:
     """Return a learning file with two situations, and one without any."""
     found = {(1, 0, 0): Situation(np.zeros(MEMORY), np.ones(2)), (1, 0, 1): Situation(np.ones(MEMORY), np.ones(2))}
-    return tuple(_written("a.npz", lambda path, held=held: save(path, OWNER, held)) for held in (found, {}))
+    return _written("a.npz", lambda path: save(path, OWNER, found)), _written(
+        "b.npz", lambda path: save(path, OWNER, {})
+    )
 
 
 @cache
@@ -251,12 +253,12 @@ def recording(
             for count, each in enumerate(data):
                 chunk.add(number, count, 10**9 + count * 10**7, 10**9, maybe(each))
         content = chunk.content()
-        packed = {"": lambda: content, "lz4": lambda: lz4.frame.compress(content)}.get(compression)
-        if packed is None:
+        if compression == "zstd":
             file.add_chunk(chunk)
         else:
+            packed = bytes(lz4.frame.compress(content)) if compression else content
             span, checksum = (chunk.first, chunk.last), crc32(content) if checked else 0
-            file.add_compressed(packed(), compression, span, len(content), checksum, chunk.indices)
+            file.add_compressed(packed, compression, span, len(content), checksum, chunk.indices)
         file.add_metadata("recording", {"begun": words("2013-06-24"), "seed": words("1")})
         text = maybe(b"head: {max_speed: 2.0, pan_limits: [-1.5, 1.5]}\n")
         file.add_attachment(Attachment(0, 0, f"{PARAMETERS}head.yaml", "text/yaml", text))

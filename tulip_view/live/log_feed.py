@@ -127,4 +127,9 @@ class LogFeed:
             lacking = self._lacking.setdefault(record.topic.name, set())
             return installed(self._log.decode(record), INPUTS[name].topic.message, lacking)
 
-        self._intake.take(name, record.data, (record.log_time - self._first) / SECOND, decode)
+        try:
+            self._intake.take(name, record.data, (record.log_time - self._first) / SECOND, decode)
+        except ValueError as error:  # it is too short for its stamp, or says what cannot be
+            raise BadInputError(
+                f"Message {record.sequence} of topic {record.topic.name} cannot be shown: {error}"
+            ) from error
