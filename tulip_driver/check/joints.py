@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_description.robot_io import Sensors
-from tulip_driver.check.rig import Rig
+from tulip_driver.check.rig import Rig, whole_steps
 from tulip_driver.check.rows import Row, judged
-from tulip_driver.contract import PERIOD
 
 Array = NDArray[np.float64]
 SWAY = 0.05  # [rad] 3 degrees
@@ -31,10 +30,10 @@ def check_joints(rig: Rig, home: Array) -> Iterator[Row]:
     for joint, name in enumerate(rig.robot.joint_names):
         way = np.zeros(len(home))
         way[joint] = SWAY if home[joint] < middle[joint] else -SWAY  # away from the nearer end of its range
-        yield rig.undisturbed(partial(_check_joint, rig, name, joint, home, way))
+        yield from rig.undisturbed(partial(_check_joint, rig, name, joint, home, way))
 
 
-def _check_joint(rig: Rig, name: str, joint: int, home: Array, way: Array) -> Row:
+def _check_joint(rig: Rig, name: str, joint: int, home: Array, way: Array) -> Iterator[Row]:
     sign = np.sign(way[joint])
     before = rig.hold(REST, lambda _: home)
     pulse = np.zeros(len(home))
@@ -56,7 +55,7 @@ def _check_joint(rig: Rig, name: str, joint: int, home: Array, way: Array) -> Ro
     if most != name:
         words += f"; {most} moved more"
     well = 0.5 < moved < 1.5 and 0.6 < driven < 1.4 and 0.1 < torque < 2.0 and most == name
-    return judged(name, words, "0.5 to 1.5, x0.6 to 1.4, x0.1 to 2", bool(well))
+    yield judged(name, words, "0.5 to 1.5, x0.6 to 1.4, x0.1 to 2", bool(well))
 
 
 def _driven(readings: Sequence[Sensors], joint: int) -> float:
@@ -64,12 +63,11 @@ def _driven(readings: Sequence[Sensors], joint: int) -> float:
 
     Where readings are missing in between, neither counts.
     """
-    steps = np.diff([reading.stamp for reading in readings])
+    steps, whole = whole_steps(readings)
     moves = np.diff([reading.joint_positions[joint] for reading in readings])
     speeds = np.array([reading.joint_velocities[joint] for reading in readings[1:]])
-    whole = steps < 1.5 * PERIOD
     way = float(moves[whole].sum())
-    return float(speeds[whole] @ steps[whole]) * 1e-9 / way if abs(way) > 0.2 * SWAY else float("nan")
+    return float(speeds[whole] @ steps[whole]) / way if abs(way) > 0.2 * SWAY else float("nan")
 
 
 def _smooth(share: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,17 +175,17 @@ class Rig:
             self.tick()
         return list(self.readings)
 
-    def undisturbed(self, check: Callable[[], Row]) -> Row:
+    def undisturbed(self, check: Callable[[], Iterable[Row]]) -> list[Row]:
         """Return what a check says; one that fails while readings stopped for a moment is made again.
 
         A computer with other things to do holds up both ends; a driver is not to blame for that.
         """
         for _ in range(TRIES):
             self._longest = 0.0
-            row = check()
-            if row.judgement is not Judgement.FAIL or self._longest < STALL:
+            rows = list(check())
+            if self._longest < STALL or all(row.judgement is not Judgement.FAIL for row in rows):
                 break
-        return row
+        return rows
 
     def wait_for_reading(self) -> list[Sensors]:
         """Go on until the first reading comes, and return it.
@@ -196,3 +196,9 @@ class Rig:
         while not self.readings:
             self.tick()
         return list(self.readings)
+
+
+def whole_steps(readings: Sequence[Sensors]) -> tuple[Array, NDArray[np.bool_]]:
+    """Return (k - 1,) times between readings [s], and whether none is missing in between."""
+    steps = np.diff([reading.stamp for reading in readings])
+    return steps * 1e-9, steps < 1.5 * PERIOD

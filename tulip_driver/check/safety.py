@@ -37,10 +37,10 @@ def check_garbage(rig: Rig, home: Array) -> Iterator[Row]:
         "answer to old sensors": lambda good: replace(good, stamp=good.stamp - 10**9, position=good.position + 1.0),
     }
     for what, spoil in wrong.items():
-        yield rig.undisturbed(partial(_check_wrong, rig, home, what, spoil))
+        yield from rig.undisturbed(partial(_check_wrong, rig, home, what, spoil))
 
 
-def _check_wrong(rig: Rig, home: Array, what: str, spoil: Callable[[JointCommand], JointCommand]) -> Row:
+def _check_wrong(rig: Rig, home: Array, what: str, spoil: Callable[[JointCommand], JointCommand]) -> Iterator[Row]:
     start = rig.hold(0.1, lambda _: home)[-1].joint_positions
     bad = [spoil(order) for order in rig.order(home)]
     reasons = [rig.loop.accept(each) for each in bad]
@@ -48,7 +48,7 @@ def _check_wrong(rig: Rig, home: Array, what: str, spoil: Callable[[JointCommand
     moved = max(float(np.abs(reading.joint_positions - start).max()) for reading in after)
     told = all(np.isfinite(_values(order)).all() for _, order in rig.probe.told)
     words = f"{'refused' if all(reasons) else 'taken'}, moved {moved:.3f} rad: {shorten(reasons[0], 60)}"
-    return judged(f"garbage: {what}", words, "refused, nothing moves", all(reasons) and told and moved < STILL)
+    yield judged(f"garbage: {what}", words, "refused, nothing moves", all(reasons) and told and moved < STILL)
 
 
 def check_limits(rig: Rig, home: Array) -> Iterator[Row]:
