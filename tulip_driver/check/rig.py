@@ -36,6 +36,7 @@ class Probe(Body):
     Attributes:
         told: Time of the driver [ns] and command of each exchange since they were last cleared.
         muted: Whether the body is told nothing new, so that it does not move.
+        went_back: Readings whose stamp was older than the one before.
     """
 
     def __init__(self, body: Body) -> None:
@@ -43,16 +44,22 @@ class Probe(Body):
         self.now: Callable[[], int] = lambda: 0  # set by the rig
         self.told: list[tuple[int, JointCommand]] = []
         self.muted = False
+        self.went_back = 0
+        self._stamp: int | None = None
 
     def start(self) -> None:
         """Start the body."""
+        self._stamp = None
         self._body.start()
 
     def exchange(self, command: JointCommand | None) -> Sensors:
         """Write the command down and hand it on."""
         if command is not None:
             self.told.append((self.now(), command))
-        return self._body.exchange(None if self.muted else command)
+        reading = self._body.exchange(None if self.muted else command)
+        self.went_back += self._stamp is not None and reading.stamp < self._stamp
+        self._stamp = reading.stamp
+        return reading
 
     def stop(self) -> None:
         """Stop the body."""
