@@ -148,6 +148,25 @@ def test_torque_that_stays_after_limp_fails() -> None:
     assert "limp: torque gone, measured" in failed(Changed(stuck))
 
 
+def test_no_command_of_the_kit_reaches_the_body_far_from_where_its_joints_are() -> None:
+    class Sinking(VirtualBody):
+        """Its joints sink to zero whenever nobody holds them."""
+
+        far = 0.0
+
+        def exchange(self, command: JointCommand | None) -> Sensors:
+            if command is None:
+                self._position *= 0.99
+            elif command.stiffness.any():
+                index = [JOINTS.index(name) for name in command.names]
+                self.far = max(self.far, float(np.abs(command.position - self._position[index]).max()))
+            return super().exchange(command)
+
+    body = Sinking()
+    rows_of(body)
+    assert 0.0 < body.far < 0.01
+
+
 def test_a_stop_that_works_once_alone_fails() -> None:
     class Once(VirtualBody):
         stops = 0

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_description.robot_io import Sensors
-from tulip_driver.check.rig import Rig, whole_steps
+from tulip_driver.check.rig import Rig, smooth, whole_steps
 from tulip_driver.check.rows import Row, judged
 
 Array = NDArray[np.float64]
@@ -44,11 +44,11 @@ def _check_joint(rig: Rig, name: str, joint: int, home: Array, way: Array) -> It
     calm = np.mean([reading.joint_efforts[joint] for reading in before[-10:]])
     torque = max(sign * (reading.joint_efforts[joint] - calm) for reading in pushed) / abs(pulse[joint])
     start = np.mean([reading.joint_positions for reading in rig.hold(REST, lambda _: home)[-10:]], axis=0)
-    out = rig.hold(RAMP, lambda passed: home + way * _smooth(passed / RAMP))
+    out = rig.hold(RAMP, lambda passed: home + way * smooth(passed / RAMP))
     out += rig.hold(REST, lambda _: home + way)
     change = np.mean([reading.joint_positions for reading in out[-10:]], axis=0) - start
     driven = _driven(out, joint)
-    rig.hold(RAMP, lambda passed: home + way * (1.0 - _smooth(passed / RAMP)))
+    rig.hold(RAMP, lambda passed: home + way * (1.0 - smooth(passed / RAMP)))
     most = rig.robot.joint_names[int(np.abs(change).argmax())]
     moved = change[joint] / way[joint]
     words = f"moves {moved:.2f} of {way[joint]:+.2f} rad, velocity x{driven:.2f}, torque x{torque:.2f}"
@@ -68,8 +68,3 @@ def _driven(readings: Sequence[Sensors], joint: int) -> float:
     speeds = np.array([reading.joint_velocities[joint] for reading in readings[1:]])
     way = float(moves[whole].sum())
     return float(speeds[whole] @ steps[whole]) / way if abs(way) > 0.2 * SWAY else float("nan")
-
-
-def _smooth(share: float) -> float:
-    """Go from 0 to 1 without a jerk."""
-    return float(0.5 - 0.5 * np.cos(np.pi * min(max(share, 0.0), 1.0)))

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 GAINS = MotionParameters().swing_stiffness, MotionParameters().swing_damping
 """Of each joint of a leg from the hip down [N m/rad], [N m s/rad]: those of legs in the air, as the robot hangs."""
 HEAD_GAINS = 20.0, 0.3  # [N m/rad], [N m s/rad]
+EASE = 1.0  # [s] for a way of any length
 STALL, TRIES = 0.03, 6  # [s] between two readings that disturb a check, and how often it is made at most
 SILENCE = 1.0  # [s] of wall-clock time without a new reading after which a body is silent
 
@@ -174,6 +175,12 @@ class Rig:
             self.tick()
         return list(self.readings)
 
+    def ease(self, position: Array) -> None:
+        """Go from where the joints are to (n,) positions [rad], without haste."""
+        assert self.loop.sensors is not None
+        start = self.loop.sensors.joint_positions
+        self.hold(EASE, lambda passed: start + (position - start) * smooth(passed / EASE))
+
     def wait(self, seconds: float) -> list[Sensors]:
         """Let time pass without commands and return the readings."""
         self.begin()
@@ -203,6 +210,11 @@ class Rig:
         while not self.readings:
             self.tick()
         return list(self.readings)
+
+
+def smooth(share: float) -> float:
+    """Go from 0 to 1 without a jerk, as the share of time passes from 0 to 1."""
+    return float(0.5 - 0.5 * np.cos(np.pi * min(max(share, 0.0), 1.0)))
 
 
 def whole_steps(readings: Sequence[Sensors]) -> tuple[Array, NDArray[np.bool_]]:
