@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from time import monotonic_ns
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from tulip_driver.contract import Body
 from tulip_driver.guard import MILLISECOND, Guard, GuardParameters
 from tulip_driver.limiter import Limiter
 
+GRACE = 1000 * MILLISECOND
+"""[ns] of wall-clock time that the next reading of a body whose clock rules may take: an emulated one may be slow.
+After that commands grow old by the wall clock: a body whose readings are lost must not hold the last one for ever."""
 JUMP = 100 * MILLISECOND
 """[ns] A body whose stamps go back further than this was begun anew."""
 
@@ -61,6 +65,7 @@ class BodyLoop:
         self.faults, self.fault = 0, ""
         self.sensors: Sensors | None = None
         self._newest: int | None = None  # stamp of the newest reading on the body's clock [ns]
+        self._arrived = 0  # when the newest reading came [ns], of wall-clock time
         self._body_clock = BodyClock()
 
     def start(self) -> None:
@@ -81,7 +86,9 @@ class BodyLoop:
         """The driver's time [ns]."""
         if self._clock is not None:
             return self._clock()
-        return self.sensors.stamp if self.sensors is not None else 0
+        if self.sensors is None:
+            return 0
+        return self.sensors.stamp + max(monotonic_ns() - self._arrived - GRACE, 0)
 
     @property
     def answered(self) -> bool:
@@ -150,7 +157,7 @@ class BodyLoop:
         self._newest = reading.stamp
         if self._clock is not None:
             reading = replace(reading, stamp=self._body_clock.to_host(reading.stamp, self._clock()))
-        self.sensors = reading
+        self.sensors, self._arrived = reading, monotonic_ns()
         return reading
 
     def _forget_time(self) -> None:

@@ -91,12 +91,20 @@ def upside_down(reading: Sensors, _: int) -> Sensors:
     return replace(reading, imu_linear_acceleration=-reading.imu_linear_acceleration)
 
 
+def no_attitude(reading: Sensors, _: int) -> Sensors:
+    return replace(reading, imu_orientation=np.zeros(4))
+
+
 def in_kilograms(reading: Sensors, _: int) -> Sensors:
     return replace(reading, foot_cells=reading.foot_cells * -0.1 - 20.0)
 
 
 def every_second(reading: Sensors, count: int) -> Sensors:
     return replace(reading, stamp=reading.stamp - count % 2 * 4_000_000)
+
+
+def jumping(reading: Sensors, count: int) -> Sensors:
+    return replace(reading, stamp=reading.stamp - 20_000_000 * (count % 50 == 49))
 
 
 def with_nan(reading: Sensors, count: int) -> Sensors:
@@ -112,8 +120,10 @@ def empty(reading: Sensors, _: int) -> Sensors:
     [
         (in_degrees, {"joint ranges"}),
         (upside_down, {"IMU acceleration, levelled"}),
+        (no_attitude, {"IMU orientation"}),
         (in_kilograms, {"foot cells"}),
         (every_second, {"rate"}),
+        (jumping, {"stamps grow"}),
         (with_nan, {"readings"}),
         (empty, {"battery", "temperatures"}),
     ],
@@ -136,6 +146,38 @@ def test_torque_that_stays_after_limp_fails() -> None:
         return replace(reading, joint_efforts=np.full(14, 4.0))
 
     assert "limp: torque gone, measured" in failed(Changed(stuck))
+
+
+def test_no_command_of_the_kit_reaches_the_body_far_from_where_its_joints_are() -> None:
+    class Sinking(VirtualBody):
+        """Its joints sink to zero whenever nobody holds them."""
+
+        far = 0.0
+
+        def exchange(self, command: JointCommand | None) -> Sensors:
+            if command is None:
+                self._position *= 0.99
+            elif command.stiffness.any():
+                index = [JOINTS.index(name) for name in command.names]
+                self.far = max(self.far, float(np.abs(command.position - self._position[index]).max()))
+            return super().exchange(command)
+
+    body = Sinking()
+    rows_of(body)
+    assert 0.0 < body.far < 0.01
+
+
+def test_a_stop_that_works_once_alone_fails() -> None:
+    class Once(VirtualBody):
+        stops = 0
+
+        def stop(self) -> None:
+            self.stops += 1
+            if self.stops == 2:
+                raise OSError("port is closed")
+
+    (row,) = (row for row in rows_of(Once(), may_move=False) if row.judgement is Judgement.FAIL)
+    assert (row.what, row.measured) == ("stop, twice", "OSError: port is closed")
 
 
 def test_a_body_that_falls_silent_fails_and_is_stopped() -> None:

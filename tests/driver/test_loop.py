@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bodies import ROBOT, NotedBody, command
+from bodies import ROBOT, Clock, NotedBody, command
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -133,6 +133,22 @@ def test_silence_means_damping_at_the_time_to_live_and_limp_half_a_second_later(
     assert {each[1:] for each in damped} == {(0.0, 0.0, 4.0)}
     assert {each[1:] for each in limp} == {(0.0, 0.0, 0.0)}
     assert loop.silent_joints == LEG_JOINTS
+
+
+def test_a_body_whose_clock_rules_and_whose_readings_are_lost_is_damped_by_the_wall_clock(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    wall = Clock(period=0)
+    monkeypatch.setattr("tulip_driver.loop.monotonic_ns", wall)
+    loop, body = started()
+    loop.accept(command(loop.now, stiffness=100.0))
+    lost = loop.sensors
+    loop.tick()
+    body.exchange = lambda told: body.told.append(told) or replace(lost, joint_efforts=np.full(14, np.nan))  # type: ignore
+    for milliseconds, stiffness in ((900, 100.0), (1080, 100.0), (1110, 0.0)):
+        wall.now = milliseconds * MILLISECOND
+        loop.tick()
+        assert told(body).stiffness[0] == stiffness, milliseconds
 
 
 def test_limp_takes_all_torque_with_the_next_exchange_and_lasts_until_released() -> None:

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tulip_description.robot_io import Sensors
-from tulip_driver.check.rig import Rig
+from tulip_driver.check.rig import Rig, smooth, whole_steps
 from tulip_driver.check.rows import Row, judged
-from tulip_driver.contract import PERIOD
 
 Array = NDArray[np.float64]
 SWAY = 0.05  # [rad] 3 degrees
@@ -31,10 +30,10 @@ def check_joints(rig: Rig, home: Array) -> Iterator[Row]:
     for joint, name in enumerate(rig.robot.joint_names):
         way = np.zeros(len(home))
         way[joint] = SWAY if home[joint] < middle[joint] else -SWAY  # away from the nearer end of its range
-        yield rig.undisturbed(partial(_check_joint, rig, name, joint, home, way))
+        yield from rig.undisturbed(partial(_check_joint, rig, name, joint, home, way))
 
 
-def _check_joint(rig: Rig, name: str, joint: int, home: Array, way: Array) -> Row:
+def _check_joint(rig: Rig, name: str, joint: int, home: Array, way: Array) -> Iterator[Row]:
     sign = np.sign(way[joint])
     before = rig.hold(REST, lambda _: home)
     pulse = np.zeros(len(home))
@@ -45,18 +44,18 @@ def _check_joint(rig: Rig, name: str, joint: int, home: Array, way: Array) -> Ro
     calm = np.mean([reading.joint_efforts[joint] for reading in before[-10:]])
     torque = max(sign * (reading.joint_efforts[joint] - calm) for reading in pushed) / abs(pulse[joint])
     start = np.mean([reading.joint_positions for reading in rig.hold(REST, lambda _: home)[-10:]], axis=0)
-    out = rig.hold(RAMP, lambda passed: home + way * _smooth(passed / RAMP))
+    out = rig.hold(RAMP, lambda passed: home + way * smooth(passed / RAMP))
     out += rig.hold(REST, lambda _: home + way)
     change = np.mean([reading.joint_positions for reading in out[-10:]], axis=0) - start
     driven = _driven(out, joint)
-    rig.hold(RAMP, lambda passed: home + way * (1.0 - _smooth(passed / RAMP)))
+    rig.hold(RAMP, lambda passed: home + way * (1.0 - smooth(passed / RAMP)))
     most = rig.robot.joint_names[int(np.abs(change).argmax())]
     moved = change[joint] / way[joint]
     words = f"moves {moved:.2f} of {way[joint]:+.2f} rad, velocity x{driven:.2f}, torque x{torque:.2f}"
     if most != name:
         words += f"; {most} moved more"
     well = 0.5 < moved < 1.5 and 0.6 < driven < 1.4 and 0.1 < torque < 2.0 and most == name
-    return judged(name, words, "0.5 to 1.5, x0.6 to 1.4, x0.1 to 2", bool(well))
+    yield judged(name, words, "0.5 to 1.5, x0.6 to 1.4, x0.1 to 2", bool(well))
 
 
 def _driven(readings: Sequence[Sensors], joint: int) -> float:
@@ -64,14 +63,8 @@ def _driven(readings: Sequence[Sensors], joint: int) -> float:
 
     Where readings are missing in between, neither counts.
     """
-    steps = np.diff([reading.stamp for reading in readings])
+    steps, whole = whole_steps(readings)
     moves = np.diff([reading.joint_positions[joint] for reading in readings])
     speeds = np.array([reading.joint_velocities[joint] for reading in readings[1:]])
-    whole = steps < 1.5 * PERIOD
     way = float(moves[whole].sum())
-    return float(speeds[whole] @ steps[whole]) * 1e-9 / way if abs(way) > 0.2 * SWAY else float("nan")
-
-
-def _smooth(share: float) -> float:
-    """Go from 0 to 1 without a jerk."""
-    return float(0.5 - 0.5 * np.cos(np.pi * min(max(share, 0.0), 1.0)))
+    return float(speeds[whole] @ steps[whole]) / way if abs(way) > 0.2 * SWAY else float("nan")

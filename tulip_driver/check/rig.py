@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 GAINS = MotionParameters().swing_stiffness, MotionParameters().swing_damping
 """Of each joint of a leg from the hip down [N m/rad], [N m s/rad]: those of legs in the air, as the robot hangs."""
 HEAD_GAINS = 20.0, 0.3  # [N m/rad], [N m s/rad]
+EASE = 1.0  # [s] for a way of any length
 STALL, TRIES = 0.03, 6  # [s] between two readings that disturb a check, and how often it is made at most
 SILENCE = 1.0  # [s] of wall-clock time without a new reading after which a body is silent
 
@@ -36,6 +37,7 @@ class Probe(Body):
     Attributes:
         told: Time of the driver [ns] and command of each exchange since they were last cleared.
         muted: Whether the body is told nothing new, so that it does not move.
+        went_back: Readings whose stamp was older than the one before.
     """
 
     def __init__(self, body: Body) -> None:
@@ -43,16 +45,22 @@ class Probe(Body):
         self.now: Callable[[], int] = lambda: 0  # set by the rig
         self.told: list[tuple[int, JointCommand]] = []
         self.muted = False
+        self.went_back = 0
+        self._stamp: int | None = None
 
     def start(self) -> None:
         """Start the body."""
+        self._stamp = None
         self._body.start()
 
     def exchange(self, command: JointCommand | None) -> Sensors:
         """Write the command down and hand it on."""
         if command is not None:
             self.told.append((self.now(), command))
-        return self._body.exchange(None if self.muted else command)
+        reading = self._body.exchange(None if self.muted else command)
+        self.went_back += self._stamp is not None and reading.stamp < self._stamp
+        self._stamp = reading.stamp
+        return reading
 
     def stop(self) -> None:
         """Stop the body."""
@@ -167,6 +175,12 @@ class Rig:
             self.tick()
         return list(self.readings)
 
+    def ease(self, position: Array) -> None:
+        """Go from where the joints are to (n,) positions [rad], without haste."""
+        assert self.loop.sensors is not None
+        start = self.loop.sensors.joint_positions
+        self.hold(EASE, lambda passed: start + (position - start) * smooth(passed / EASE))
+
     def wait(self, seconds: float) -> list[Sensors]:
         """Let time pass without commands and return the readings."""
         self.begin()
@@ -175,17 +189,17 @@ class Rig:
             self.tick()
         return list(self.readings)
 
-    def undisturbed(self, check: Callable[[], Row]) -> Row:
+    def undisturbed(self, check: Callable[[], Iterable[Row]]) -> list[Row]:
         """Return what a check says; one that fails while readings stopped for a moment is made again.
 
         A computer with other things to do holds up both ends; a driver is not to blame for that.
         """
         for _ in range(TRIES):
             self._longest = 0.0
-            row = check()
-            if row.judgement is not Judgement.FAIL or self._longest < STALL:
+            rows = list(check())
+            if self._longest < STALL or all(row.judgement is not Judgement.FAIL for row in rows):
                 break
-        return row
+        return rows
 
     def wait_for_reading(self) -> list[Sensors]:
         """Go on until the first reading comes, and return it.
@@ -196,3 +210,14 @@ class Rig:
         while not self.readings:
             self.tick()
         return list(self.readings)
+
+
+def smooth(share: float) -> float:
+    """Go from 0 to 1 without a jerk, as the share of time passes from 0 to 1."""
+    return float(0.5 - 0.5 * np.cos(np.pi * min(max(share, 0.0), 1.0)))
+
+
+def whole_steps(readings: Sequence[Sensors]) -> tuple[Array, NDArray[np.bool_]]:
+    """Return (k - 1,) times between readings [s], and whether none is missing in between."""
+    steps = np.diff([reading.stamp for reading in readings])
+    return steps * 1e-9, steps < 1.5 * PERIOD

@@ -19,6 +19,7 @@ from tulip_driver.guard import MILLISECOND
 Array = NDArray[np.float64]
 DAMPED_WITHIN = 50.0  # [ms] after a command's time-to-live
 LIMP_WITHIN = 20.0  # [ms] after the request
+WRONG = 0.05  # [rad] off: no harm, should such a command be obeyed after all
 STILL = 0.02  # [rad] that garbage may move a joint
 ENDS = 1000  # [ms] in which a wanted position gets from one end of the slowest joint's range to the other
 FREE = 0.02  # share of its greatest torque that a limp joint may still show
@@ -33,14 +34,14 @@ def check_garbage(rig: Rig, home: Array) -> Iterator[Row]:
         "unknown joint": lambda good: replace(good, names=("tail", *good.names[1:])),
         "joint twice": lambda good: replace(good, names=(good.names[1], *good.names[1:])),
         "negative stiffness": lambda good: replace(good, stiffness=-good.stiffness),
-        "stale sequence": lambda good: replace(good, sequence=1, position=good.position + 1.0),
-        "answer to old sensors": lambda good: replace(good, stamp=good.stamp - 10**9, position=good.position + 1.0),
+        "stale sequence": lambda good: replace(good, sequence=1, position=good.position + WRONG),
+        "answer to old sensors": lambda good: replace(good, stamp=good.stamp - 10**9, position=good.position + WRONG),
     }
     for what, spoil in wrong.items():
-        yield rig.undisturbed(partial(_check_wrong, rig, home, what, spoil))
+        yield from rig.undisturbed(partial(_check_wrong, rig, home, what, spoil))
 
 
-def _check_wrong(rig: Rig, home: Array, what: str, spoil: Callable[[JointCommand], JointCommand]) -> Row:
+def _check_wrong(rig: Rig, home: Array, what: str, spoil: Callable[[JointCommand], JointCommand]) -> Iterator[Row]:
     start = rig.hold(0.1, lambda _: home)[-1].joint_positions
     bad = [spoil(order) for order in rig.order(home)]
     reasons = [rig.loop.accept(each) for each in bad]
@@ -48,7 +49,7 @@ def _check_wrong(rig: Rig, home: Array, what: str, spoil: Callable[[JointCommand
     moved = max(float(np.abs(reading.joint_positions - start).max()) for reading in after)
     told = all(np.isfinite(_values(order)).all() for _, order in rig.probe.told)
     words = f"{'refused' if all(reasons) else 'taken'}, moved {moved:.3f} rad: {shorten(reasons[0], 60)}"
-    return judged(f"garbage: {what}", words, "refused, nothing moves", all(reasons) and told and moved < STILL)
+    yield judged(f"garbage: {what}", words, "refused, nothing moves", all(reasons) and told and moved < STILL)
 
 
 def check_limits(rig: Rig, home: Array) -> Iterator[Row]:
@@ -61,6 +62,9 @@ def check_limits(rig: Rig, home: Array) -> Iterator[Row]:
         while rig.loop.now - begin < ENDS * MILLISECOND:
             rig.command(far, 10.0 * rig.robot.effort_limits, velocity=10.0 * rig.robot.velocity_limits)
             rig.tick()
+    # The last wanted positions are far from where the joints are: forget them before the body hears anything again.
+    rig.loop.limp("its limits were checked")
+    rig.loop.release()
     rig.probe.muted = False
     told = [(at, dict(zip(order.names, range(len(order.names)), strict=True)), order) for at, order in rig.probe.told]
     names = [name for name in rig.robot.joint_names if all(name in places for _, places, _ in told)]
@@ -84,9 +88,7 @@ def check_limits(rig: Rig, home: Array) -> Iterator[Row]:
     yield judged("limit: rate", f"{speed.max():.2f} of the greatest speed", "1", bool(speed.max() < 1.001))
     velocity = float((np.abs(column("velocity")) / rig.robot.velocity_limits[own]).max())
     yield judged("limit: velocity", f"{velocity:.2f} of the greatest", "1", velocity < 1.001)
-    for _ in range(20):  # the body has stood still all the time: go on from there
-        rig.command(home)
-        rig.tick()
+    rig.ease(home)  # it may have sunk meanwhile, as nobody commanded it
 
 
 def check_limp(rig: Rig, home: Array) -> Iterator[Row]:
@@ -139,16 +141,20 @@ def check_silence(rig: Rig) -> Iterator[Row]:
 
 def check_stop(rig: Rig) -> Iterator[Row]:
     """Yield the lines about the end, and a new start."""
-    rig.loop.stop()
-    rig.loop.stop()
-    yield judged("stop, twice", "done", "no error", True)
+    try:
+        rig.loop.stop()
+        rig.loop.stop()
+        error = ""
+    except Exception as failure:  # anybody's code may raise anything, and the robot must still come to a stop
+        error = f"{type(failure).__name__}: {failure}"
+    yield judged("stop, twice", error or "done", "no error", not error)
     try:
         rig.loop.start()
         rig.begin()
         came = len(rig.wait_for_reading())
         yield judged("start again", f"{came} reading", "a reading", came > 0)
-    except BodyError as error:
-        yield judged("start again", str(error), "a reading", False)
+    except BodyError as failure:
+        yield judged("start again", str(failure), "a reading", False)
     finally:
         rig.loop.stop()
 
