@@ -68,7 +68,7 @@ TWO = ["--teams", "2", "--keeper", "dribble_and_kick", "--no-record"]
         (export_model.main, ["new", "--body", "broken.yaml"], "broken.yaml is not YAML"),
         (export_model.main, ["new", "--variant", "table"], "expected the playing variant, or urdf alone"),
         (match.main, [*PORTLESS, "--scenario", "trail"], "no scenario 'trail'. Did you mean trial?"),
-        (match.main, [*PORTLESS, "--parameters", "broken.yaml"], "no valid YAML: expected ',' or ']'"),
+        (match.main, [*PORTLESS, "--parameters", "broken.yaml"], "expected ',' or ']' in line 3, column 1"),
         (match.main, [*PORTLESS, "--parameters", "node.yaml"], "Did you mean vision?"),
         (match.main, [*PORTLESS, "--parameters", "seed.yaml"], "sets driver.seed, which the trial itself sets"),
         (match.main, [*PORTLESS, "--parameters", "none.yaml"], "none.yaml cannot be read: No such file"),
