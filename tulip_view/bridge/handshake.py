@@ -92,7 +92,8 @@ def admit(head: bytes, origins: Collection[str] = ()) -> Admission:
     if name is None:
         raise RefusedError(
             HTTPStatus.BAD_REQUEST,
-            f"Sub-protocol is {_shown(', '.join(named)) or 'not named'}; expected {CURRENT}, or {OLDER} of older viewers.",
+            f"Sub-protocol is {_shown(', '.join(named)) or 'not named'};"
+            f" expected {CURRENT}, or {OLDER} of older viewers.",
         )
     return Admission(_renamed(first, lines, CURRENT), name)
 

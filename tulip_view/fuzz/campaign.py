@@ -19,6 +19,7 @@ from types import FrameType
 from typing import NoReturn
 
 from tulip_view.fuzz.inputs import KINDS, Kind
+from tulip_view.fuzz.samples import SCRATCH
 
 LONGEST = 10.0  # [s] of processor time for one input; more is a hang
 DEAD = 300.0  # [s] of wall-clock time without any news; then it hangs where no signal reaches it
@@ -114,7 +115,7 @@ def run(kind: Kind, count: int) -> Result:
     fatal: set[int] = set()
     context = multiprocessing.get_context("fork")
     current = context.Value("q", 0, lock=False)
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory(dir=SCRATCH) as name:
         folder = Path(name)
         while first < count:
             ours, theirs = context.Pipe(duplex=False)
