@@ -34,7 +34,9 @@ def main(
     nodes: Annotated[
         list[str] | None, typer.Argument(help=f"Nodes to start; none: the robot. {plan.known_names()}")
     ] = None,
-    driver: Annotated[str, typer.Option(help="What stands for the body; 'none' for no driver.")] = "sim",
+    driver: Annotated[
+        str, typer.Option(help="What stands for the body: a name, package.module:Class, or 'none' for no driver.")
+    ] = "sim",
     namespace: Annotated[str, typer.Option(help="Namespace of the robot, as in 'striker'.")] = "",
     parameters: Annotated[list[Path] | None, typer.Option(help="YAML file `node: {name: value}`; repeatable.")] = None,
     log: Annotated[Path | None, typer.Option(help="Recording that driver 'log' plays back.")] = None,
