@@ -22,7 +22,7 @@ VERSION = 1
 LARGEST = 2**24  # [B] of its arrays; a situation takes some kilobytes
 DAMAGES = (
     *(OSError, ValueError, LookupError, TypeError, EOFError, OverflowError, MemoryError, RuntimeError),
-    *(zipfile.BadZipFile, zlib.error, tokenize.TokenError),
+    *(zipfile.BadZipFile, zlib.error, tokenize.TokenError, SystemError),
 )
 """What NumPy and the library of .npz files raise on meeting something else."""
 APART = (

@@ -16,6 +16,7 @@ from tulip_view.recording import ALL, Array, Recording, Track, Wanted
 LONGEST_GAP = 1.0
 """[s] Between messages that lie further apart than this nothing is interpolated."""
 MOST_ROWS = 5_000_000
+MOST_VALUES = 100_000_000  # in all columns: 0.8 GB
 TIME = Column("time_s", "s", Alignment.LINEAR)
 
 
@@ -105,7 +106,16 @@ def make_table(recording: Recording, sources: Sequence[Source], times: Array) ->
         recording: What was read; see `topics_of`.
         sources: Where columns come from; those whose topics are not in the recording are left out.
         times: (n,) ascending instants [s].
+
+    Raises:
+        BadInputError: if that makes more values than fit into memory.
     """
+    columns = sum(len(source.columns) for source in sources if recording.get(source.topic) is not None)
+    if columns * len(times) > MOST_VALUES:
+        raise BadInputError(
+            f"A table of {columns} columns and {len(times)} rows holds more than {MOST_VALUES} values:"
+            f" {recording.end - recording.begin:.0f} s are recorded, or damaged stamps say so. Choose a lower --rate."
+        )
     table = Table([TIME], [times], [""], [])
     for source in sources:
         track = recording.get(source.topic)

@@ -361,3 +361,18 @@ def test_a_file_that_holds_more_than_was_ever_learned_is_refused_before_it_is_un
     assert path.stat().st_size < LARGEST // 100
     with pytest.raises(LearningFileError, match="expected at most"):
         load(path, {}, (12, 5))
+
+
+def test_a_file_of_torn_arrays_or_texts_is_refused_in_words(tmp_path: Path) -> None:
+    path = tmp_path / "learned.npz"
+    beyond = np.frombuffer(np.full(30, 0x7FFFFFFF, np.uint32).tobytes(), "<U30")[0:1].reshape(())
+    with path.open("wb") as file:
+        np.savez(
+            file, version=np.array(1), owner=beyond, keys=np.zeros((1, 3)), memories=np.zeros(1), baselines=np.zeros(1)
+        )
+    with pytest.raises(LearningFileError, match="damaged"):
+        load(path, {}, (12, 5))
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("version.npy", b"\x93NUMPY\x01\x00\x06\x00{'de\n(")
+    with pytest.raises(LearningFileError, match="damaged"):
+        load(path, {}, (12, 5))

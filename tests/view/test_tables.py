@@ -19,11 +19,12 @@ from typer.testing import CliRunner, Result
 from tulip_description.robot import JOINTS
 from tulip_ros import topics
 from tulip_ros.bag import Bag
+from tulip_ros.errors import BadInputError
 from tulip_ros.log_file import Log
 from tulip_view.columns import SOURCES, UNITS
 from tulip_view.recording import choose_robot, read, robots_in
 from tulip_view.table_files import is_matlab_name
-from tulip_view.tables import Table, make_table, native_times, regular_times, sources_of, topics_of
+from tulip_view.tables import MOST_VALUES, Table, make_table, native_times, regular_times, sources_of, topics_of
 
 app = typer.Typer()
 app.command()(export_script.main)
@@ -208,3 +209,12 @@ def test_a_recording_without_robot_is_told(tmp_path: Path):
     bag.close()
     result = run(tmp_path / "clock", "--to", tmp_path / "t.csv")
     assert result.exit_code == 2 and "holds no robot" in result.stderr
+
+
+def test_a_table_that_does_not_fit_into_memory_is_refused_before_it_is_made(recording: Path):
+    with Log(recording) as log:
+        sources = sources_of(("joints",))
+        found = read(log, choose_robot(log, None), topics_of(sources, None))
+    times = np.broadcast_to(0.0, MOST_VALUES)  # takes no memory itself
+    with pytest.raises(BadInputError, match="Choose a lower --rate"):
+        make_table(found, sources, times)
