@@ -27,7 +27,7 @@ from tulip_sim.bench.processor_time import family_time
 from tulip_sim.bench.runner import Bench, Row
 from tulip_sim.match_graph import SILENCE, TrialWatcher, trial_plan
 
-ROUNDS = 5
+ROUNDS = 3
 BEGIN, WATCHED = 1.0, 20.0  # [s] of play before it is measured, and while it is; a goal ends it sooner
 SHARE = 1 / 3  # of a core, asked for
 FACES = ("view", "bridge", "menu")
