@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 import time
 from collections.abc import Sequence
@@ -42,9 +41,9 @@ def measure(components: str, pictures: str, seed: int, seconds: float) -> Row:
         record_trial(folder, pictures, seed, seconds)
         with Log(folder) as log:
             recompute(log, chosen)  # compiles vision's loops, fills the system's cache
-            begin, cpu = time.perf_counter(), _processor_time()
+            begin = time.perf_counter()
             outcome = recompute(log, chosen)
-            compared, compared_cpu = time.perf_counter() - begin, _processor_time() - cpu
+            compared = time.perf_counter() - begin
             begin = time.perf_counter()
             recompute(log, chosen, Path(temporary) / "recomputed")
             written = time.perf_counter() - begin
@@ -57,17 +56,10 @@ def measure(components: str, pictures: str, seed: int, seconds: float) -> Row:
                 "recorded_s": outcome.seconds,
                 "recording_mb": sum(path.stat().st_size for path in log.files) / 1e6,
                 "times_real_time_comparing": outcome.seconds / compared,
-                "times_real_time_by_cpu_time": outcome.seconds / compared_cpu,
                 "times_real_time_writing": outcome.seconds / written,
                 "messages": sum(each.recorded for each in differences),
                 "messages_equal": sum(each.equal for each in differences),
             }
-
-
-def _processor_time() -> float:
-    """Return the time that this process and those that it has waited for took of all cores [s]."""
-    spent = os.times()
-    return spent.user + spent.system + spent.children_user + spent.children_system
 
 
 def lines(rows: Sequence[Row]) -> list[str]:
@@ -77,14 +69,14 @@ def lines(rows: Sequence[Row]) -> list[str]:
         " what was recorded and with the truth (`--no-output`), and written as well. Asked for:"
         f" {BARS[True]:.0f} times real time with vision, {BARS[False]:.0f} times without.",
         "",
-        "| components | pictures | recorded [s] | times real time | by CPU time | with writing | equal | bar |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| components | pictures | recorded [s] | times real time | with writing | equal | bar |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for row in rows:
         bar = BARS["vision" in row["components"].split(",")]
         text.append(
             f"| {row['components'].replace(',', ', ')} | {row['pictures']} | {row['recorded_s']:.0f}"
-            f" | {row['times_real_time_comparing']:.1f} | {row['times_real_time_by_cpu_time']:.1f}"
+            f" | {row['times_real_time_comparing']:.1f}"
             f" | {row['times_real_time_writing']:.1f} | {row['messages_equal']} of {row['messages']} | {bar:.0f} |"
         )
     return text
