@@ -129,7 +129,7 @@ def test_a_mended_recording_has_no_broken_chunk_in_it(tmp_path: Path) -> None:
     with Log(path) as log:
         summary = log._files[0].summary
     file.schemas, file.channels = dict(summary.schemas), dict(summary.channels)
-    file.add_compressed(bytes(broken), "", head.span, len(broken), crc32(bytes(broken)), {})
+    file.add_compressed([bytes(broken)], "", head.span, len(broken), crc32(bytes(broken)), {})
     file.abandon()  # as when its recorder was killed
     with pytest.raises(BadInputError):
         Log(file.path)
