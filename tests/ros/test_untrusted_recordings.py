@@ -21,10 +21,10 @@ from tulip_ros.bag import Bag
 from tulip_ros.cdr import without_gaps
 from tulip_ros.decompression import LARGEST, beginning, unpacked
 from tulip_ros.errors import BadInputError
+from tulip_ros.latched import SPARE, quality_of
 from tulip_ros.log_file import Log, LoggedTopic, files_of
 from tulip_ros.log_index import DamagedLogError
 from tulip_ros.recovery import recover
-from tulip_ros.replay import SPARE, quality_of
 from tulip_ros.serialized import after_header, time_at
 
 BOMB = 2**26  # [B] that some kilobytes unpack to
