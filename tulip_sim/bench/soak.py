@@ -113,7 +113,7 @@ def summarize(rows: list[Row]) -> list[str]:
         " each figure, within each process, after its warm-up; beside its slope stands half of the width of its"
         f" {CONFIDENCE:.0%} confidence interval, for as many independent samples as the correlation of neighbouring"
         " ones leaves. Flat: the interval holds zero. `at most`: what the upper end of the interval makes of"
-        f" {PERIOD:.0f} hours. Memory is what is a process's own; shared memory counts as files. Hours are simulated ones.",
+        f" {PERIOD:.0f} hours. Memory is what is a process's own; shared memory counts as files. Hours are simulated.",
     ]
     played = _segments(rows, lockstep.MODE)
     if played:
