@@ -41,7 +41,7 @@ class SoakWatcher(MatchWatcher):
     def __init__(self) -> None:
         """Connect."""
         self._known: dict[int, int] = {}
-        self.services: defaultdict[str, list[float]] = defaultdict(list)
+        self.served: defaultdict[str, list[float]] = defaultdict(list)
         """Of each node, since they were last taken: mean time over a message in each second [ms]."""
         self.pictures: list[float] = []
         """Since they were last taken: from the shutter to the first world state that knows it, simulated time [ms]."""
@@ -56,7 +56,7 @@ class SoakWatcher(MatchWatcher):
             messages = sum(rates[topic] for topic in latencies)
             if messages > 0.0:
                 name = f"{namespace}/{status.name}" if namespace else status.name
-                self.services[name].append(sum(rates[each] * latencies[each] for each in latencies) / messages)
+                self.served[name].append(sum(rates[each] * latencies[each] for each in latencies) / messages)
 
     def _estimate_of(self, team: int) -> Callable[[WorldState], None]:
         follow = super()._estimate_of(team)
@@ -106,12 +106,12 @@ def play(folder: Path, seconds: float, seed: int = 1) -> None:
                 nodes[name] = resources(pid)
                 if pid in last[2]:
                     nodes[name][PROCESSOR] = round((spent[pid] - last[2][pid]) / period, 4)
-                if watcher.services[name]:
-                    nodes[name][SERVICE] = round(float(np.mean(watcher.services[name])), 4)
+                if watcher.served[name]:
+                    nodes[name][SERVICE] = round(float(np.mean(watcher.served[name])), 4)
             whole: Sample = {SHARED: shared_memory_files(list(pids.values())), FACTOR: period / (moment - last[1])}
             if watcher.pictures:
                 whole[PICTURE] = round(float(np.mean(watcher.pictures)), 2)
             samples.add(file, {SIMULATED: now, WHOLE: whole, NODES: nodes, EVENTS: events})
-            watcher.services.clear()
+            watcher.served.clear()
             watcher.pictures.clear()
             events, last = [], (now, time.monotonic(), spent)
