@@ -35,7 +35,7 @@ def resources(pid: int) -> dict[str, float]:
 
 
 def shared_memory_files(pids: Collection[int]) -> int:
-    """Return how many files in shared memory processes have mapped, or nobody has.
+    """Return how many files in shared memory belong to processes, or to nobody any more.
 
     What other programs of this machine have in use is not counted.
 
@@ -46,7 +46,12 @@ def shared_memory_files(pids: Collection[int]) -> int:
     others: set[str] = set()
     for maps in Path("/proc").glob("[0-9]*/maps"):
         with contextlib.suppress(OSError):  # ended, or another user's
-            found = set(re.findall(rf"{SHARED_MEMORY}/\S+", maps.read_text()))
+            found = set(re.findall(rf"{SHARED_MEMORY}/(\S+)", maps.read_text()))
             (ours if int(maps.parent.name) in pids else others).update(found)
-    there = {str(path) for path in SHARED_MEMORY.iterdir()}
-    return len(there - (others - ours))
+    foreign = others - ours
+    return sum(_segment(path.name) not in foreign for path in SHARED_MEMORY.iterdir())
+
+
+def _segment(name: str) -> str:
+    """Return the segment that a file belongs to: Fast DDS keeps locks and semaphores beside it, which nobody maps."""
+    return re.sub(r"^sem\.|_mutex$|_[es]l$", "", name)
