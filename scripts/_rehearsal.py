@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from _progress import progress
@@ -14,12 +15,17 @@ from tulip_description.robot import LEG_JOINTS, Robot, load_robot
 from tulip_motion.parameters import MotionParameters
 from tulip_ros import parameters
 from tulip_ros.errors import BadInputError
+from tulip_ros.nodes import DRIVER
 from tulip_ros.parameters import ROS_NAMES
 from tulip_ros.plan import Start
+from tulip_sim.rehearsal.motions import everything
 from tulip_sim.rehearsal.picture import draw
+from tulip_sim.rehearsal.play import play
+from tulip_sim.rehearsal.present import standing
 from tulip_sim.rehearsal.run import SEEDS, Play, rehearse
 from tulip_sim.rehearsal.verdict import Figures, Limits, figures, reasons
 
+EVERYTHING = "some of everything that the walk may do"
 REFUSED = 1
 """Exit code of a command whose motion is beyond the limits."""
 
@@ -37,11 +43,46 @@ def motion_parameters(starts: Sequence[Start]) -> MotionParameters:
     return parameters.replace(MotionParameters(), own, "motion")
 
 
-def passes(play: Play, console: Console, what: str, seeds: int = SEEDS, picture: Path | None = None) -> bool:
+def may_launch(starts: Sequence[Start], anyway: bool) -> bool:
+    """Rehearse the walk with the parameters of a plan, and return whether its nodes may be started.
+
+    Args:
+        starts: Nodes of the plan.
+        anyway: They may be started whatever comes out.
+
+    Raises:
+        BadInputError: if the plan has no motion control, or its parameters cannot be used.
+    """
+    p = motion_parameters(starts)
+    rate = next((start.parameters.get("rate", 1.0) for start in starts if start.name == DRIVER), 1.0)
+    walk = partial(play, everything(p), p, standing(load_robot()), rate=rate)
+    return may_go(walk, EVERYTHING, anyway)
+
+
+def may_go(one_play: Play, what: str, anyway: bool) -> bool:
+    """Rehearse a motion that is about to be sent to a robot, tell it on the error output, and return whether it may.
+
+    Args:
+        one_play: Plays it once.
+        what: Is rehearsed, in words.
+        anyway: It may, whatever comes out.
+
+    Raises:
+        BadInputError: as `passes`.
+    """
+    console = Console(stderr=True)
+    if passes(one_play, console, what):
+        return True
+    words = "It is sent all the same, as told by --anyway." if anyway else "It is not sent; --anyway sends it."
+    console.print(words, highlight=False)
+    return anyway
+
+
+def passes(one_play: Play, console: Console, what: str, seeds: int = SEEDS, picture: Path | None = None) -> bool:
     """Rehearse a motion, tell what it asks of the robot, and return whether it may go to hardware.
 
     Args:
-        play: Plays it once.
+        one_play: Plays it once.
         console: Where it is told.
         what: Is rehearsed, in words.
         seeds: How often it is played.
@@ -54,7 +95,7 @@ def passes(play: Play, console: Console, what: str, seeds: int = SEEDS, picture:
     try:
         with progress() as bar:
             task = bar.add_task("rehearsing", total=seeds)
-            courses = rehearse(play, range(1, seeds + 1), lambda: bar.advance(task))
+            courses = rehearse(one_play, range(1, seeds + 1), lambda: bar.advance(task))
     except ValueError as error:
         raise BadInputError(f"Rehearsal: {error}.") from error
     seen, found = figures(courses, limits), reasons(robot, courses, limits)
@@ -62,7 +103,7 @@ def passes(play: Play, console: Console, what: str, seeds: int = SEEDS, picture:
     console.print(_table(robot, seen))
     for name, words in _lines(seen, len(courses)):
         console.print(f"{name:<18}{words}", highlight=False, soft_wrap=True)
-    for note in dict.fromkeys(note for course in courses for note in course.notes):
+    for note in {note.partition(":")[0]: note for course in courses for note in course.notes}.values():
         console.print(f"{'note':<18}{note}", highlight=False, soft_wrap=True, markup=False)
     if picture is not None:
         try:

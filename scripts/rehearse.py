@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from _rehearsal import REFUSED, motion_parameters, passes
+from _rehearsal import EVERYTHING, REFUSED, motion_parameters, passes
 from rich.console import Console
 
 from tulip_description.robot import load_robot
@@ -66,7 +66,7 @@ def main(
         present = _present(begin, live, namespace)
         if present.note:
             console.print(f"{'note':<18}{present.note}", highlight=False)
-        what = " ".join(motions) if motions else "some of everything that the walk may do"
+        what = " ".join(motions) if motions else EVERYTHING
         well = passes(partial(play, parts, parameters, present, engine=engine), console, what, seeds, picture)
     except BadInputError as error:
         print(f"error: {error}", file=sys.stderr)

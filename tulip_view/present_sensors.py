@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ class _Listener(ComponentNode):
         self.fault = ""
         self._instants = SameStamp(*(topic.name for topic in SENSORS))
         for topic in SENSORS:
-            self.listen(topic, lambda message, name=topic.name: self._on_sensor(name, message))
+            self.listen(topic, partial(self._on_sensor, topic.name))
 
     def begin_anew(self) -> None:
         """Forget what was heard: time began anew."""

@@ -16,6 +16,7 @@ from tulip_motion.reach import Velocity
 
 LONGEST = 600.0  # [s] of one part
 KICK_TIME = 4.0  # [s] until the robot stands again after a kick, with time to spare
+STAND, WALK = "stand", "walk"
 KINDS = {"kick": KickKind.FORWARD, "sidekick": KickKind.SIDE}
 GRAMMAR = "walk FORWARD LEFT TURN [SECONDS], stand [SECONDS], kick left|right [SPEED], sidekick left|right [SPEED]"
 
@@ -42,9 +43,9 @@ def everything(parameters: MotionParameters) -> tuple[Part, ...]:
     forward, back, left, turn = limits(parameters)
     walks = [(forward, 0.0, 0.0), (-back, 0.0, 0.0), (0.0, left, 0.0), (0.0, 0.0, turn)]
     walks = [walk for walk in walks if any(walk)] + [(0.5 * forward, 0.0, 0.5 * turn)]
-    parts = [Part("stand", 1.0)]
+    parts = [Part(STAND, 1.0)]
     for walk in walks:
-        parts += [_walk(walk, 4.0), Part("stand", 2.0)]
+        parts += [_walk(walk, 4.0), Part(STAND, 3.0)]
     return tuple(parts)
 
 
@@ -94,7 +95,7 @@ def _part(name: str, values: list[str], parameters: MotionParameters, seconds: f
         raise ValueError(f"{name} {' '.join(values)}: expected finite numbers")
     if name in KINDS:
         return _kick(name, values, numbers, parameters)
-    counts = {"walk": (3, 4), "stand": (0, 1)}.get(name)
+    counts = {WALK: (3, 4), STAND: (0, 1)}.get(name)
     if counts is None:
         raise ValueError(f"there is no motion {name!r}; expected {GRAMMAR}")
     if len(numbers) != len(values) or not counts[0] <= len(values) <= counts[1]:
@@ -102,7 +103,7 @@ def _part(name: str, values: list[str], parameters: MotionParameters, seconds: f
     duration = numbers[counts[0]] if len(numbers) > counts[0] else seconds
     if not 0.0 < duration <= LONGEST:
         raise ValueError(f"{name} lasts {duration:g} s; expected above 0 and at most {LONGEST:g} s")
-    if name == "stand":
+    if name == STAND:
         return Part(name, duration)
     velocity = (numbers[0], numbers[1], numbers[2])
     forward, back, left, turn = limits(parameters)
@@ -117,7 +118,7 @@ def _part(name: str, values: list[str], parameters: MotionParameters, seconds: f
 
 
 def _walk(velocity: Velocity, seconds: float) -> Part:
-    return Part(f"walk {velocity[0]:g} {velocity[1]:g} {velocity[2]:g}", seconds, velocity)
+    return Part(f"{WALK} {velocity[0]:g} {velocity[1]:g} {velocity[2]:g}", seconds, velocity)
 
 
 def _kick(name: str, values: list[str], numbers: list[float], parameters: MotionParameters) -> Part:

@@ -8,12 +8,14 @@ from pathlib import Path
 from tulip_description.body_file import read_body
 from tulip_description.planar import Pose2D
 from tulip_description.robot import Robot, load_robot
-from tulip_description.robot_io import JointCommand
+from tulip_description.robot_io import JointCommand, Sensors
+from tulip_driver.guard import Guard, GuardParameters
+from tulip_driver.limiter import Limiter
 from tulip_motion.interface import MotionMode, WalkCommand, WalkMode
 from tulip_motion.motion import Motion
 from tulip_motion.parameters import MotionParameters
 from tulip_sim.parameters import WorldParameters
-from tulip_sim.rehearsal.motions import Part
+from tulip_sim.rehearsal.motions import STAND, Part
 from tulip_sim.rehearsal.present import Present
 from tulip_sim.rehearsal.watch import Course, Watch
 from tulip_sim.scenario import Scenario
@@ -27,7 +29,12 @@ STOPPING = 6.0  # [s] in which a walk ends before a kick
 
 
 def play(
-    parts: Sequence[Part], parameters: MotionParameters, present: Present, seed: int, engine: str = "pybullet"
+    parts: Sequence[Part],
+    parameters: MotionParameters,
+    present: Present,
+    seed: int,
+    engine: str = WorldParameters.engine,
+    rate: float = 1.0,
 ) -> Course:
     """Play motions once, to their end or until the robot falls.
 
@@ -37,6 +44,7 @@ def play(
         present: How it stands.
         seed: Of the simulated robot's masses, friction and sensor errors.
         engine: Of the physics.
+        rate: Share of the joints' greatest speeds that the driver lets wanted positions move with.
 
     Raises:
         ValueError: if the robot does not stand on both feet, or the parameters do not fit it.
@@ -52,8 +60,8 @@ def play(
         tilt=present.tilt,
     )
     try:
-        stage = _Stage(world, Motion(parameters, robot), Watch(world, seed))
-        stage.go(Part("stand", SETTLING))
+        stage = _Stage(world, Motion(parameters, robot), Watch(world, seed), rate)
+        stage.go(Part(STAND, SETTLING))
         for part in parts:
             stage.go(part)
         return stage.watch.course(stage.fall)
@@ -71,10 +79,11 @@ def body_of(parameters: MotionParameters, robot: Robot) -> Robot | None:
 
 
 class _Stage:
-    """World and motion control, with the tick of delay that the graph has."""
+    """World and motion control, with the tick of delay that the graph has, and what a driver has before any body."""
 
-    def __init__(self, world: World, motion: Motion, watch: Watch) -> None:
+    def __init__(self, world: World, motion: Motion, watch: Watch, rate: float) -> None:
         self._world, self._motion, self.watch = world, motion, watch
+        self._guard, self._limiter = Guard(world.robot, GuardParameters()), Limiter(world.robot, rate)
         self._pending: JointCommand | None = None
 
     @property
@@ -115,7 +124,16 @@ class _Stage:
         sensors = self._world.sensors()
         answer = self._motion.tick(sensors)
         if self._pending is not None:
-            self._world.apply(self._pending)
+            self._tell_body(self._pending, sensors)
         self._pending = answer
         self._world.advance(TICK)
         self.watch.look(sensors)
+
+    def _tell_body(self, command: JointCommand, sensors: Sensors) -> None:
+        now = self._world.stamp
+        refusal = self._guard.accept(command, now)
+        told = self._limiter.command(self._guard, now, sensors)
+        if told is not None:
+            refusal = refusal or self._world.apply(told)
+        if refusal and refusal not in self.watch.refusals:
+            self.watch.refusals.append(refusal)
