@@ -19,7 +19,9 @@ from tulip_sim.bench.soaking import graph, lockstep, samples
 from tulip_sim.bench.soaking.resources import FILES, MEMORY, THREADS
 from tulip_sim.bench.soaking.samples import SIMULATED, Sample
 from tulip_sim.bench.soaking.slopes import CONFIDENCE, Series, Slope, fit
+from tulip_sim.match_settings import MatchSettings
 from tulip_sim.perception import EYES
+from tulip_sim.robot_stack import RobotSettings
 
 HOURS, MINUTES = 8.0, 30.0  # of lockstep and of a graph, simulated
 FOLDER = Path(__file__).parents[2] / "recordings" / "soak"
@@ -57,7 +59,8 @@ def measure(mode: str, hours: float, folder: str, eyes: str) -> Row:
     """Play until a folder holds so many simulated hours, and return the samples of the last chunk of them."""
     place = Path(folder)
     if mode == lockstep.MODE:
-        lockstep.play_until(place, hours * 3600.0, eyes)
+        robot = RobotSettings(perception=EYES[eyes])
+        lockstep.play_until(place, hours * 3600.0, MatchSettings(robots=(robot, robot)))
         begin = CHUNK * (math.ceil(hours / CHUNK - 1e-9) - 1)
         return {"mode": mode, "hours": hours, "segments": _chunk(samples.read(place, mode), begin, hours)}
     seconds = hours * 3600.0

@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from tulip_description.posture import standing_posture
 from tulip_description.quaternion import Quaternion
-from tulip_description.robot import Robot
+from tulip_description.robot import LEG_JOINTS, Robot
 from tulip_description.robot_io import Sensors
 
 Array = NDArray[np.float64]
 MOST_TILT = 0.25  # [rad] of a trunk that is upright, as motion control has it for a limp robot that stands up
-MOST_SPEED = 0.5  # [rad/s] of a joint at rest: of a robot that sways, as measured over some readings
+MOST_SPEED = 0.5  # [rad/s] of a leg's joint, mean of some readings: more than a robot that sways and balances
 BEYOND = 0.02  # [rad] outside of its range that a joint's reading may be, by its zero
 LIFTED = 20.0  # [N] on each foot, below which it is told that the feet carry nothing
 
@@ -60,7 +60,7 @@ def present_of(robot: Robot, readings: Sequence[Sensors]) -> Present:
         raise ValueError("joint positions or the IMU's orientation are not finite")
     if not (np.linalg.norm(turns, axis=1) > 0.5).all():
         raise ValueError("the IMU's orientation is no quaternion of unit length")
-    speeds = np.abs(np.mean([each.joint_velocities for each in readings], axis=0))
+    speeds = np.abs(np.mean([each.joint_velocities[: len(LEG_JOINTS)] for each in readings], axis=0))
     fastest = int(np.argmax(speeds))
     if not speeds[fastest] <= MOST_SPEED:
         raise ValueError(

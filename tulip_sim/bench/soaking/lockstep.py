@@ -13,9 +13,7 @@ from tulip_sim.bench.soaking.resources import resources, shared_memory_files
 from tulip_sim.bench.soaking.samples import SIMULATED, Sample
 from tulip_sim.match_settings import MatchSettings
 from tulip_sim.match_summary import MatchSummary
-from tulip_sim.perception import EYES
 from tulip_sim.play_lockstep_match import play_lockstep_match
-from tulip_sim.robot_stack import RobotSettings
 
 MODE = "lockstep"
 PERIOD = 60.0  # [s] of simulated time between two samples
@@ -24,16 +22,14 @@ SHARED, OBJECTS = "files in shared memory", "Python objects"
 PROCESSOR, WALL = "processor time by simulated time", "wall time by simulated time"
 
 
-def play_until(folder: Path, target: float, eyes: str) -> None:
+def play_until(folder: Path, target: float, settings: MatchSettings) -> None:
     """Play whole matches until a folder holds so much of them.
 
     Args:
         folder: Of the samples. What earlier processes left there counts.
         target: Simulated time [s].
-        eyes: One of `EYES`.
+        settings: Of each match.
     """
-    robot = RobotSettings(perception=EYES[eyes])
-    settings = MatchSettings(robots=(robot, robot))
     while sum(segment.duration for segment in samples.read(folder, MODE)) < target:
         seeds = [sample[SEED] for segment in samples.read(folder, MODE) for sample in segment.samples]
         watch = _of_this_process(folder)
