@@ -85,5 +85,5 @@ def present_of(robot: Robot, readings: Sequence[Sensors]) -> Present:
         )
     loads = np.mean([each.foot_cells.sum(axis=1) for each in readings], axis=0)
     note = "" if loads.min() > LIFTED else "a foot carries nothing; it is rehearsed as if it stood on both"
-    x, y, z, w = level.as_quat().tolist()
+    x, y, z, w = level.as_quat(canonical=True).tolist()
     return Present(np.clip(positions, lower, upper), (x, y, z, w), note)
