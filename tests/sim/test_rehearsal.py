@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,12 @@ from tulip_description.planar import Pose2D
 from tulip_description.posture import standing_posture
 from tulip_description.robot import LEG_JOINTS, load_robot
 from tulip_description.robot_io import Sensors
+from tulip_motion.identification.experiment_plan import PlanParameters
+from tulip_motion.identification.experiment_settings import ExperimentSettings
 from tulip_motion.interface import KickKind, Side
 from tulip_motion.parameters import MotionParameters
 from tulip_sim.parameters import WorldParameters
+from tulip_sim.rehearsal import experiment
 from tulip_sim.rehearsal.motions import Part, everything, parse
 from tulip_sim.rehearsal.picture import draw
 from tulip_sim.rehearsal.play import play
@@ -257,3 +261,12 @@ def test_a_kick_is_played_after_the_walk_has_ended() -> None:
     kick_begins = seen.beginnings[-1][0]
     foot = seen.speeds[:, LEG_JOINTS.index("right_knee")]
     assert np.abs(foot[seen.times > kick_begins]).max() > 0.2
+
+
+@pytest.mark.sim
+def test_the_identification_s_experiment_is_watched_as_walks_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(experiment, "run_experiment", partial(experiment.run_experiment, longest=4.0))
+    seen = experiment.play_experiment(ExperimentSettings(plan=PlanParameters(postures=9)), standing(ROBOT), 1)
+    assert len(seen.times) == 1000 and not seen.fall  # 4 s at 250 Hz
+    assert 0.05 < np.nanmin(seen.margins[250:]) and 0.1 < np.abs(seen.torques).max() < 0.9
+    assert seen.beginnings and seen.clearance[0] > 0.01
