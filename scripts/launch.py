@@ -46,6 +46,10 @@ def main(
     logs: Annotated[Path | None, typer.Option(help="Folder for one log file a node.")] = None,
     view: Annotated[bool, typer.Option("--view", help="Open a page to watch and steer in a browser.")] = False,
     view_port: Annotated[int, typer.Option(help="TCP port of that page.", min=1, max=65535)] = PORT,
+    rehearse: Annotated[
+        bool, typer.Option("--rehearse", help="First play the walk in the simulator; start nothing if it fails.")
+    ] = False,
+    anyway: Annotated[bool, typer.Option("--anyway", help="Start all the same if it fails.")] = False,
 ) -> None:
     """Start nodes and keep them running."""
     try:
@@ -63,6 +67,11 @@ def main(
             with Log(log):  # says what is wrong with it before anything starts
                 values["driver"] = {"file": str(log.absolute())}
         starts = plan.make_plan(names, None if driver == "none" else driver, namespace, parameters or (), values)
+        if rehearse:
+            from _rehearsal import REFUSED, may_launch  # brings the simulator, which others need not wait for
+
+            if not may_launch(starts, anyway):
+                raise typer.Exit(REFUSED)
         if view:
             starts += page_beside(view_port, plan.check_namespace(namespace))
             print(f"watch it at {address(view_port)}", file=sys.stderr)
