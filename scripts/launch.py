@@ -14,15 +14,16 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from _network import Network
 from rich.console import Console
 from rich.live import Live
 
-from tulip_ros import plan
+from tulip_ros import network, plan
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, require, unknown
 from tulip_ros.launch import Launcher
 from tulip_ros.log_file import Log
 from tulip_ros.monitor import Monitor
-from tulip_ros.nodes import AGGREGATOR, DRIVER, ROBOT
+from tulip_ros.nodes import AGGREGATOR, DRIVER, LOOKERS, ROBOT
 from tulip_ros.run import ComponentNode, session
 from tulip_ros.transport import NAMES as TRANSPORTS
 from tulip_view.live.beside import PORT, address, page_beside
@@ -35,8 +36,12 @@ def main(
         list[str] | None, typer.Argument(help=f"Nodes to start; none: the robot. {plan.known_names()}")
     ] = None,
     driver: Annotated[
-        str, typer.Option(help="What stands for the body: a name, package.module:Class, or 'none' for no driver.")
-    ] = "sim",
+        str | None,
+        typer.Option(
+            help="What stands for the body: a name, package.module:Class, or none. By default sim; none where all nodes"
+            f" only look ({', '.join(sorted(LOOKERS))})."
+        ),
+    ] = None,
     namespace: Annotated[str, typer.Option(help="Namespace of the robot, as in 'striker'.")] = "",
     parameters: Annotated[list[Path] | None, typer.Option(help="YAML file `node: {name: value}`; repeatable.")] = None,
     log: Annotated[Path | None, typer.Option(help="Recording that driver 'log' plays back.")] = None,
@@ -50,11 +55,14 @@ def main(
         bool, typer.Option("--rehearse", help="First play the walk in the simulator; start nothing if it fails.")
     ] = False,
     anyway: Annotated[bool, typer.Option("--anyway", help="Start all the same if it fails.")] = False,
+    peers: Network = "",
 ) -> None:
     """Start nodes and keep them running."""
     try:
         if transport not in TRANSPORTS:
             raise unknown("transport", transport, TRANSPORTS)
+        if driver is None:
+            driver = "none" if nodes and set(nodes) <= LOOKERS else "sim"
         names = list(nodes or ROBOT) + (["recorder"] if record else []) + (["bridge"] if bridge else [])
         if "bridge" in names:
             require("foxglove", "bridge")
@@ -72,6 +80,7 @@ def main(
 
             if not may_launch(starts, anyway):
                 raise typer.Exit(REFUSED)
+        network.join(peers, transport)
         if view:
             starts += page_beside(view_port, plan.check_namespace(namespace))
             print(f"watch it at {address(view_port)}", file=sys.stderr)

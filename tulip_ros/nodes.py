@@ -90,6 +90,10 @@ ROBOT: tuple[str, ...] = tuple(name for name, entry in NODES.items() if entry.pl
 """The nodes that make the robot play, in the order of the data flow."""
 
 
+LOOKERS = frozenset({AGGREGATOR, "markers", "recorder", "view", "bridge"})
+"""The nodes that only look at a robot: alone they want no driver, as the robot's may run on another computer."""
+
+
 def find_node(name: str) -> NodeEntry:
     """Return a node's entry.
 

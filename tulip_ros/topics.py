@@ -284,6 +284,14 @@ USER_WISH = Topic(
     "what a person wants, from viewers that publish; checked as set_user_command, stamp and sequence are not read",
 )
 GAME_STATE = Topic("game_state", GameState, LATCHED, ("game_input",), ("strategy",), "the referee's view of the game")
+USER_PRESENT = Topic(
+    "user_present",
+    String,
+    CONTROL,
+    (),
+    ("user_input",),
+    "a face says four times a second that whoever began the walk test by it is there: without that it ends",
+)
 USER_COMMAND = Topic(
     "user_command", UserCommand, LATCHED, ("user_input",), ("strategy", "identify"), "the user's last wish"
 )
@@ -385,6 +393,7 @@ TOPICS: tuple[Topic, ...] = (
     TF,
     GAME_STATE,
     USER_WISH,
+    USER_PRESENT,
     USER_COMMAND,
     WALK_COMMAND,
     HEAD_COMMAND,

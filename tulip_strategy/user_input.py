@@ -29,10 +29,13 @@ class UserInputParameters:
     autostart: bool = False  # play as soon as the referee says so; else stand until the user starts
     strategy: str = "dribble_and_kick"  # until the user chooses another
     walk_test_limits: tuple[float, float, float] = (0.6, 0.2, 1.0)  # [m/s], [m/s], [rad/s] the gait was tested with
+    walk_test_lifetime: float = 1.5  # [s] without a sign of who wanted it; bridges hiccups of a Wi-Fi
 
     def __post_init__(self) -> None:
         if not all(math.isfinite(limit) and limit > 0.0 for limit in self.walk_test_limits):
             raise ValueError(f"walk_test_limits is {self.walk_test_limits}; expected three finite numbers > 0")
+        if not (math.isfinite(self.walk_test_lifetime) and self.walk_test_lifetime > 0.0):
+            raise ValueError(f"walk_test_lifetime is {self.walk_test_lifetime} s; expected a finite number > 0")
 
 
 class UserInput:
@@ -103,6 +106,19 @@ class UserInput:
             sequence=self._command.sequence + 1,
         )
         return ""
+
+    def end_walk_test(self, stamp: int) -> bool:
+        """Stop and stand if a walk test goes on: whoever wanted it gives no sign any more.
+
+        Args:
+            stamp: When [ns].
+
+        Returns:
+            Whether one went on.
+        """
+        if self._command.request is not UserRequest.WALK_TEST:
+            return False
+        return not self.ask(stamp, UserRequest.STOP)
 
     def _check(self, velocity: tuple[float, float, float]) -> str:
         for (name, unit), value, limit in zip(_AXES, velocity, self._parameters.walk_test_limits, strict=True):

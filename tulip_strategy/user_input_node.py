@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from time import monotonic
 from typing import Any
 
 from tulip_ros import topics
@@ -21,6 +22,9 @@ TRIGGERS = {
 """Services without arguments, for the wishes that need none, and what each asks for."""
 
 
+LOOK = 0.1  # [s] between two looks at whether who has the robot walk is still there
+
+
 class UserInputNode(ComponentNode):
     """Takes wishes and publishes the one that holds."""
 
@@ -33,9 +37,12 @@ class UserInputNode(ComponentNode):
         super().__init__("user_input")
         self._settings = self.load(UserInputParameters())
         self._command = self.sender(topics.USER_COMMAND)
+        self._sign = monotonic()  # [s] the last one of whoever has the robot walk
         self.begin_anew()
         self.follow_clock()
         self.listen(topics.USER_WISH, self._on_published_wish)
+        self.listen(topics.USER_PRESENT, self._on_sign)
+        self.every(LOOK, self._look_for_the_user)
         self.create_service(topics.SET_USER_COMMAND.type, topics.SET_USER_COMMAND.name, self._on_wish)
         for service, request in TRIGGERS.items():
             self.create_service(service.type, service.name, self._trigger(request))
@@ -54,7 +61,18 @@ class UserInputNode(ComponentNode):
     def _on_published_wish(self, message: Any) -> None:
         self._settle(self._ask(message))
 
+    def _on_sign(self, _: Any) -> None:
+        self._sign = monotonic()
+
+    def _look_for_the_user(self) -> None:
+        """End a walk test that nobody is there for any more: a link that broke must not leave the robot walking."""
+        silent = monotonic() - self._sign  # wall clock: however slow a simulation is, people are not
+        if silent > self._settings.walk_test_lifetime and self._input.end_walk_test(self._now()):
+            self.health.count("abandoned walk tests", f"walk test ended: no sign of its user for {silent:.1f} s")
+            self._publish()
+
     def _ask(self, wish: Any) -> str:
+        self._sign = monotonic()
         forward, left, turning = (float(value) for value in wish.velocity)
         return self._input.ask(self._now(), wish.request, wish.strategy, (forward, left, turning), wish.argument)
 

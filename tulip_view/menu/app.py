@@ -28,7 +28,7 @@ BEGIN, END = "begin the experiment: the robot stands on one foot, then on the ot
 
 
 class Menu(App[None]):
-    """Shows a robot and sends what the user wants; the last wish holds when it ends."""
+    """Shows a robot and sends what the user wants; the last wish holds when it ends, but for a walk test."""
 
     ENABLE_COMMAND_PALETTE = False
     CSS = """
