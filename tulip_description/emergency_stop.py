@@ -33,7 +33,7 @@ class StopWord:
 
     def __str__(self) -> str:
         what = "emergency stop" if self.engaged else "emergency stop released" if self.by else "no emergency stop"
-        return what + (f" by {self.by}" if self.by else "") + (f": {self.reason}" if self.reason else "")
+        return what + (f" by {self.by}" if self.by else "") + (f" ({self.reason})" if self.reason else "")
 
 
 class EmergencyStop:

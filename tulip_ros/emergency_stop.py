@@ -14,6 +14,7 @@ from tulip_msgs.msg import EmergencyStop as EmergencyStopMessage
 from tulip_ros import topics
 from tulip_ros.finding import Finding, Level
 from tulip_ros.time import header, stamp_of
+from tulip_ros.topics import Topic
 
 WAITING = 10  # words of several senders may come at once, and each of them counts
 LONGEST = 100  # letters of a stranger's words that are shown
@@ -27,7 +28,7 @@ class StopLink:
         node: Node,
         by: str,
         obey: Callable[[StopWord], None] = lambda word: None,
-        robot: str = "",
+        topic: Topic = topics.EMERGENCY_STOP,
         knows_time: bool = True,
     ) -> None:
         """Connect.
@@ -36,13 +37,12 @@ class StopLink:
             node: Has publisher and subscription.
             by: Who engages or releases it by this link, as in "menu".
             obey: Is told when a stop begins, is confirmed with other words, or ends.
-            robot: Namespace of the robot, below the node's own or as in "/striker"; "" for the node's own.
+            topic: Of the robot, if it is not in the node's own namespace.
             knows_time: Whether the node's clock is the robot's.
         """
         self._by, self._obey = by, obey
         self._clock = node.get_clock() if knows_time else None
         self._stop, self._lock = EmergencyStop(), RLock()
-        topic = topics.EMERGENCY_STOP.within(robot)
         self._sender = topic.publish_from(node)
         topic.subscribe_from(node, self._hear, depth=WAITING)
 

@@ -133,7 +133,9 @@ class TopicJoints(Joints):
         self._late = 0  # answers that were not in when they were due, in the last second
         self._name = f"{namespace}: " if namespace else ""
         node.health.check(self._command_health)
-        self._emergency_stop = StopLink(node, "driver", self._on_emergency_stop, namespace)
+        self._emergency_stop = StopLink(
+            node, "driver", self._on_emergency_stop, topics.EMERGENCY_STOP.within(namespace)
+        )
         node.health.check(self._emergency_stop_health)
         node.listen(topics.LEG_COMMAND.within(namespace), self._on_legs)
         node.listen(topics.HEAD_JOINT_COMMAND.within(namespace), self._on_head)

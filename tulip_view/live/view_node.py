@@ -93,7 +93,7 @@ class ViewNode(ComponentNode):
         robot = self._feed.robot
         with self._calls_lock:
             if robot not in self._calls:
-                self._calls[robot] = UserCalls(self, self._asker, robot, self._steer.tell)
+                self._calls[robot] = UserCalls(self, self._asker, "page", robot, self._steer.tell)
             return self._calls[robot]
 
     def _heading(self) -> float:
