@@ -81,7 +81,9 @@ def test_menu_waits_for_user_input_agrees_with_a_second_face_and_goes_on_after_a
                 await screen.until_text(words)
             await screen.press("l")
             await screen.until(lambda: ears.says(UserCommand.LIMP))
-            await screen.until_text("emergency stop: sent", "wish LIMP", "emergency stop by menu (key l); o releases it")
+            await screen.until_text(
+                "emergency stop: sent", "wish LIMP", "emergency stop by menu (key l); o releases it"
+            )
             await screen.press("u")
             await screen.until_text("stand: refused (emergency stop by menu (key l); release it first)")
             await screen.press("o")
