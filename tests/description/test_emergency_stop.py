@@ -44,7 +44,7 @@ def test_a_stop_holds_until_it_is_released_whatever_is_repeated():
 
 @given(st.integers(0, 10**9), st.integers(-(10**9), 10**9))
 def test_words_count_in_the_order_in_which_they_were_said_however_clocks_differ(begin: int, off: int):
-    """Two computers, of which one's clock is off by `off`, answer each other; all orders of arrival come to the same."""
+    """Two computers, one with its clock off by `off`, answer each other: all orders of arrival come to the same."""
     here, there = EmergencyStop(), EmergencyStop()
     words = [here.engage("menu", "", now=begin)]
     there.hear(words[-1], now=begin + off)
