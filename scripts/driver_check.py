@@ -24,6 +24,7 @@ from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, unknown
 BODIES: dict[str, tuple[str, dict[str, Any]]] = {
     "echo": ("tulip_driver.echo:EchoBody", {}),
     "sim": ("tulip_sim.simulated_body:SimulatedBody", {"harness": True}),
+    "mujoco": ("tulip_sim.simulated_body:SimulatedBody", {"harness": True, "engine": "mujoco"}),
     "log": ("tulip_driver.log_body:LogBody", {}),
     "wire": ("tulip_driver.wire.body:WireBody", {}),
 }

@@ -38,9 +38,10 @@ from tulip_ros.time import header, to_message
 CLOCKS = ("host", "body")
 SILENCE = 0.1  # [s] of wall-clock time without a new reading after which somebody is told
 SLOW_TICKS, SECOND_TICKS = 5, 250  # readings between two messages of /clock, and of the battery
+TOLD = 0.2  # [s] at most until everybody knows of a body that is lost
 SHARE = 0.75  # of PERIOD that a body with a clock of its own waits for the answer to its last reading
 AT_ONCE = 4  # messages that are handled in a tick though the answer is in: no sender shall wait for long
-LISTENING = 0.5  # [s] at the start without commands, in which an emergency stop that holds gets known
+LISTENING = 1.0  # [s] at the start without commands, in which an emergency stop that holds gets known: 0.8 s measured
 
 Spin = Callable[[float], None]
 """Waits up to so many seconds [s] for messages and handles them."""
@@ -114,7 +115,7 @@ class BodyNode(ComponentNode):
         except BodyError as error:
             self.get_logger().fatal(f"the body is lost: {error}")
             self.emergency_stop.engage(f"the body is lost: {error}")
-            self.emergency_stop.wait_until_told(LISTENING)
+            self.emergency_stop.wait_until_told(TOLD)
             raise SystemExit(1) from error  # whoever launched it starts it again
         if reading is not None:
             self._heard = time.monotonic()

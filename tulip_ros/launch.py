@@ -7,16 +7,15 @@ import os
 import signal
 import subprocess
 import tempfile
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from time import monotonic, sleep
+from time import monotonic
 from types import TracebackType
 
 from tulip_ros import transport
+from tulip_ros.ending import end_in_order
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
 from tulip_ros.nodes import DRIVER
 from tulip_ros.plan import Start
@@ -24,9 +23,6 @@ from tulip_ros.plan import Start
 FIRST_PAUSE, LONGEST_PAUSE = 0.2, 10.0  # [s] before a restart; doubles with each death in a row
 SETTLED = 20.0  # [s] of life after which earlier deaths are forgotten
 DEATHS = 6  # in a row, after which a node is given up
-PATIENCE = 5.0  # [s] to end by itself after SIGTERM, before SIGKILL
-IMPATIENCE = 0.5  # [s] of that after a second Ctrl-C: a driver still has the time to leave its body without torque
-ALONE = 1.0  # [s] that a driver has to end before the nodes that command it
 RESTARTS_VARIABLE = "TULIP_RESTARTS"
 """Environment variable that tells a node how many times it was started again."""
 DIES_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl(2)
@@ -115,21 +111,11 @@ class Launcher:
         return tuple(process.state() for process in self._processes)
 
     def stop(self) -> None:
-        """End all processes and leave nothing of theirs behind, however often somebody presses Ctrl-C meanwhile.
-
-        The driver comes first, so that the body is without torque before the nodes that balance it end. The recorder
-        comes last, so that it sees the others end.
-        """
+        """End all processes: the body's driver first, the recorder last. Leave nothing of theirs behind."""
         drivers = [process for process in self._processes if process.node == DRIVER]
         recorders = [process for process in self._processes if process.node == "recorder"]
         others = [process for process in self._processes if process not in (*drivers, *recorders)]
-        with _counted_interrupts() as interrupts:
-            _ask_to_end(drivers)
-            _wait_for(drivers, ALONE, interrupts)
-            _ask_to_end(others)
-            _end([*drivers, *others], interrupts)
-            _ask_to_end(recorders)
-            _end(recorders, interrupts)
+        end_in_order(drivers, others, recorders)
         # Not only after a kill: now and then Fast DDS leaves a port behind of nodes that end at the same time.
         transport.remove_leftovers()
 
@@ -227,45 +213,6 @@ class _Process:
     def _tail(self) -> str:
         lines = self._log.read_text(errors="replace").splitlines()
         return "\n".join(f"  {line}" for line in lines[-TAIL:])
-
-
-@contextmanager
-def _counted_interrupts() -> Iterator[list[int]]:
-    """Yield the signals that ask this program to end and come meanwhile: they hurry the end and do not break it off."""
-    came: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield came  # only the main thread gets signals
-        return
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, lambda it, _: came.append(it)) for number in numbers]
-    try:
-        yield came
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            if handler is not None:  # else it is none of Python's
-                signal.signal(number, handler)
-
-
-def _ask_to_end(processes: Sequence[_Process]) -> None:
-    for process in processes:
-        process.signal(signal.SIGTERM)
-
-
-def _wait_for(processes: Sequence[_Process], seconds: float, interrupts: Sequence[int]) -> None:
-    """Wait until processes have ended, so long [s] at most, and less if somebody is impatient."""
-    begin = monotonic()
-    while not all(process.has_ended() for process in processes):
-        if monotonic() - begin > (min(seconds, IMPATIENCE) if interrupts else seconds):
-            return
-        sleep(0.01)
-
-
-def _end(processes: Sequence[_Process], interrupts: Sequence[int]) -> None:
-    """Wait until processes that were asked to have ended; kill those that do not."""
-    _wait_for(processes, PATIENCE, interrupts)
-    for process in processes:
-        process.signal(signal.SIGKILL)
-        process.forget()
 
 
 def _die_with_parent(parent: int) -> None:

@@ -90,7 +90,7 @@ def test_a_node_is_told_how_many_times_it_was_started_again(launch):
 
 
 def test_node_that_ignores_sigterm_is_killed(launch, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("tulip_ros.launch.PATIENCE", 0.2)
+    monkeypatch.setattr("tulip_ros.ending.PATIENCE", 0.2)
     with launch(a=STUBBORN) as launcher:
         wait_for(lambda: is_up(launcher, "a"))
         pid = launcher.states()[0].pid
@@ -123,8 +123,8 @@ def test_the_driver_has_ended_before_the_others_are_asked_to_and_the_recorder_co
 
 
 def test_a_second_ctrl_c_hurries_the_end_and_leaves_no_orphans(launch, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("tulip_ros.launch.PATIENCE", 1e6)
-    monkeypatch.setattr("tulip_ros.launch.ALONE", 1e6)
+    monkeypatch.setattr("tulip_ros.ending.PATIENCE", 1e6)
+    monkeypatch.setattr("tulip_ros.ending.ALONE", 1e6)
     names = ("driver", "motion", "recorder")
     with launch(**dict.fromkeys(names, STUBBORN)) as launcher:
         wait_for(lambda: all(is_up(launcher, name) for name in names))
