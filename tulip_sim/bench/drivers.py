@@ -2,15 +2,17 @@
 
 A robot's driver and user input run as processes. In place of motion control a commander presses the left hip against
 the end of its range, so that its torque is there for as long as the driver obeys and stiffness is not zero. All times
-are of the wall clock, from the message's or call's sending to the first reading without that torque, so the way of
-the reading back is in them.
+are of the wall clock, from the message's or call's sending until the driver tells its body to have no stiffness, where
+a body can be listened to, and until the first reading without that torque.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import select
+import socket
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
@@ -31,12 +33,14 @@ from tulip_ros.launch import Launcher
 from tulip_ros.plan import make_plan
 from tulip_ros.run import ComponentNode, session
 from tulip_ros.time import stamp_of
+from tulip_sim.bench import drivers_bodies
 from tulip_sim.bench.free_port import free_port, own_domain
 from tulip_sim.bench.runner import Bench, Row
 from tulip_sim.simulated_body import SimulatedBody
 
 DRIVERS = ("echo", "sim", "mujoco", "wire")
 ROUNDS, TRIES = 5, 10  # tries of each kind in each round
+TOLD, SEEN = "told to the body", "seen in a reading"
 SILENCE, TOPIC, SERVICE = "commands stop", "stop by topic", "stop by service"
 KINDS = {SILENCE: 50.0, TOPIC: 20.0, SERVICE: None}
 """What is tried, and the most that is asked for [ms]."""
@@ -46,6 +50,9 @@ AT_REST = 0.1  # [rad/s]
 PATIENCE = 60.0  # [s] for what takes a second
 STEADY = 25  # readings at rest before a try
 CHECK = "check"
+LISTENED = {"echo": drivers_bodies.ToldEcho, "wire": drivers_bodies.ToldWire}
+"""Drivers whose bodies tell when they are told to have no stiffness."""
+SOON = 1.0  # [s] in which that must have come
 
 
 class Commander(ComponentNode):
@@ -116,23 +123,43 @@ def measure(driver: str, number: int | str) -> Row:
     if number == CHECK:
         return row | _check(driver)
     rng = np.random.default_rng([DRIVERS.index(driver), int(number)])
-    with running(driver) as (commander, until):
-        found: dict[str, list[float]] = {kind: [] for kind in KINDS}
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear,
+        running(driver, _listening(ear)) as (commander, until),
+    ):
         for _ in range(TRIES):
-            for kind, times in found.items():
+            for kind in KINDS:
                 until(lambda: commander.steady >= STEADY)
                 begin = time.monotonic() + float(rng.uniform(0.0, 0.05))
                 until(partial(_is_past, begin))
-                times.append(round(1e3 * _try(commander, kind, until), 2))
-    return row | {f"{kind} [ms]": times for kind, times in found.items()}
+                _forget(ear)
+                begin, seen = _try(commander, kind, until)
+                row.setdefault(f"{kind}, {SEEN} [ms]", []).append(round(1e3 * (seen - begin), 2))
+                if driver in LISTENED:
+                    (told,) = drivers_bodies.MOMENT.unpack(ear.recv(64))
+                    row.setdefault(f"{kind}, {TOLD} [ms]", []).append(round(1e3 * (told - begin), 2))
+    return row
+
+
+def _forget(ear: socket.socket) -> None:
+    """Drop what was told of commands that were late by themselves."""
+    while select.select([ear], [], [], 0.0)[0]:
+        ear.recv(64)
 
 
 def _is_past(moment: float) -> bool:
     return time.monotonic() > moment
 
 
-def _try(commander: Commander, kind: str, until: Until) -> float:
-    """Stop the robot in one way, bring it back, and return how long the torque stayed [s]."""
+def _listening(ear: socket.socket) -> int:
+    """Open a socket for what bodies tell, and return its port."""
+    ear.bind(("127.0.0.1", 0))
+    ear.settimeout(SOON)
+    return int(ear.getsockname()[1])
+
+
+def _try(commander: Commander, kind: str, until: Until) -> tuple[float, float]:
+    """Stop the robot in one way, bring it back; return when that began and when the torque was gone [s]."""
     commander.gone_at = None
     begin = time.monotonic()
     if kind == SILENCE:
@@ -143,33 +170,38 @@ def _try(commander: Commander, kind: str, until: Until) -> float:
         commander.engage.call_async(commander.engage.srv_type.Request())
     until(lambda: commander.gone_at is not None)
     assert commander.gone_at is not None
-    passed = commander.gone_at - begin
+    gone_at = commander.gone_at
     commander.commands = True
     if kind != SILENCE:
         until(lambda: commander.stop.engaged)
         released = commander.release.call_async(commander.release.srv_type.Request())
         until(released.done)
         until(lambda: not commander.stop.engaged)
-    return passed
+    return begin, gone_at
 
 
 @contextmanager
-def running(driver: str) -> Iterator[tuple[Commander, Until]]:
-    """Run driver and user input, and yield the commander and what waits."""
+def running(driver: str, report: int) -> Iterator[tuple[Commander, Until]]:
+    """Run driver and user input, and yield the commander and what waits.
+
+    Args:
+        driver: One of `DRIVERS`.
+        report: UDP port for what its body tells.
+    """
     port = free_port()
     simulated = {"camera": False, "referee": False, "mode": "free", "wait_for": ["user_input"]}
-    values: dict[str, Mapping[str, Any]] = {}
-    nodes = ["user_input"]
+    nodes, name = ["user_input"], "sim"
+    values: dict[str, dict[str, Any]] = {"driver": {**simulated, "world": {"engine": _engine(driver)}}}
+    if driver in LISTENED:
+        name = f"{drivers_bodies.__name__}:{LISTENED[driver].__name__}"
+        values = {"driver": {"options": [f"report={report}"]}}
     if driver == "wire":
         nodes.append("emulator")
-        values = {
-            "emulator": {**simulated, "port": port},
-            "driver": {"options": [f"port={port}", f"patience={PATIENCE}"]},
-        }
-    elif driver != "echo":
-        values = {"driver": {**simulated, "world": {"engine": "mujoco" if driver == "mujoco" else "pybullet"}}}
+        values["emulator"] = {**simulated, "port": port}
+        values["driver"]["options"] += [f"port={port}", f"patience={PATIENCE}"]
+        values["driver"]["clock"] = "body"
     with (
-        Launcher(make_plan(nodes, "sim" if driver == "mujoco" else driver, values=values)) as launcher,
+        Launcher(make_plan(nodes, name, values=values)) as launcher,
         session(Commander, arguments=[], handle_signals=False) as (commander, spin),
     ):
 
@@ -185,6 +217,10 @@ def running(driver: str) -> Iterator[tuple[Commander, Until]]:
         yield commander, until
 
 
+def _engine(driver: str) -> str:
+    return "mujoco" if driver == "mujoco" else "pybullet"
+
+
 def _check(driver: str) -> Row:
     """Return the verdict of the contract's test kit."""
     robot, port = load_robot(), free_port()
@@ -196,7 +232,7 @@ def _check(driver: str) -> Row:
         elif driver == "wire":
             body = WireBody(robot, port=port, patience=PATIENCE)
         else:
-            body = SimulatedBody(robot, harness=True, engine="mujoco" if driver == "mujoco" else "pybullet")
+            body = SimulatedBody(robot, harness=True, engine=_engine(driver))
         rows = list(check_driver(body, robot, lambda: True))
     return {
         "checks": len(rows),
@@ -211,24 +247,25 @@ def summarize(rows: list[Row]) -> list[str]:
     life = GuardParameters().time_to_live
     lines = [
         "From the sending of the last command, of the emergency stop's message, or of the call of its service, at"
-        " random moments, to the first reading of the joints without torque, on the wall clock: medians, and the most."
-        f" Asked for: {KINDS[SILENCE]:.0f} ms, of which commands live {life} ms; and {KINDS[TOPIC]:.0f} ms. A reading"
-        " comes every 4 ms, and its torque is the mean since the one before; that and its own way are in the times.",
+        " random moments, on the wall clock: until the driver tells its body to have no stiffness, where the bench can"
+        " stand between them; and until the first reading of the joints without torque. Medians, and the most. Asked"
+        f" for: damping within {KINDS[SILENCE]:.0f} ms, of which commands live {life} ms; zero stiffness within"
+        f" {KINDS[TOPIC]:.0f} ms in the driver. A reading comes every 4 ms, is up to 2 ms old, and tells the mean"
+        " torque since the one before.",
         "",
-        "| driver | `driver_check.py` | tries of each | commands stop, to damping | emergency stop by topic, to zero"
-        " stiffness | by service |",
-        "| --- | --- | --- | --- | --- | --- |",
+        "| driver | `driver_check.py` | tries of each | until | commands stop | emergency stop by topic | by service |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for driver in DRIVERS:
         own = [row for row in rows if row["driver"] == driver and "left out" not in row]
-        tries = {kind: [each for row in own for each in row.get(f"{kind} [ms]", ())] for kind in KINDS}
-        checks = [row for row in own if row["round"] == CHECK]
-        if not own:
-            continue
-        cells = [driver, "; ".join(f"{row['passed']} of {row['checks']}" for row in checks) or "-"]
-        cells.append(str(len(tries[TOPIC])))
-        cells += [_told(times) for times in tries.values()]
-        lines.append(f"| {' | '.join(cells)} |")
+        checks = "; ".join(f"{row['passed']} of {row['checks']}" for row in own if row["round"] == CHECK)
+        for until in (TOLD, SEEN):
+            tries = [[each for row in own for each in row.get(f"{kind}, {until} [ms]", ())] for kind in KINDS]
+            if not tries[0]:
+                continue
+            lines.append(
+                f"| {driver} | {checks or '-'} | {len(tries[0])} | {until} | {' | '.join(map(_told, tries))} |"
+            )
     lines += [f"- {row['driver']} fails {what}" for row in rows for what in row.get("failed", ())]
     return lines
 
