@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from threading import RLock
 
 from rclpy.duration import Duration
@@ -90,8 +91,9 @@ class StopLink:
         return Finding(Level.ERROR, f"{self.word}: release it when nobody can come to harm")
 
     def _hear(self, message: EmergencyStopMessage) -> None:
-        stamp = max(stamp_of(message), 0) or self._stamp()
-        word = StopWord(message.engaged, _plain(message.by), _plain(message.reason), stamp, message.sequence)
+        word = word_from_message(message)
+        if not word.stamp:
+            word = replace(word, stamp=self._stamp())
         with self._lock:
             held = self.engaged
             if self._stop.hear(word, time.time_ns()):
@@ -113,6 +115,12 @@ class StopLink:
                 sequence=word.sequence,
             )
         )
+
+
+def word_from_message(message: EmergencyStopMessage) -> StopWord:
+    """Return what a message says."""
+    by, reason, stamp = _plain(message.by), _plain(message.reason), max(stamp_of(message), 0)
+    return StopWord(message.engaged, by, reason, stamp, message.sequence)
 
 
 def _plain(words: str) -> str:

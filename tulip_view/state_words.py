@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tulip_description.emergency_stop import StopWord
+from tulip_ros.emergency_stop import word_from_message
 from tulip_strategy.interface import UserRequest
 from tulip_view.columns import PHASES, SECONDARY, SET_PLAYS, name_of
 
@@ -17,7 +17,7 @@ def stop_words(message: Any) -> str:
     Args:
         message: Of the emergency stop.
     """
-    return str(StopWord(message.engaged, message.by, message.reason))
+    return str(word_from_message(message))
 
 
 def wish_words(command: Any) -> str:
