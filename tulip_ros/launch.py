@@ -1,4 +1,4 @@
-"""Starts nodes, each a process; restarts one that died; ends all of them cleanly."""
+"""Starts nodes, each a process; restarts one that died; ends all of them cleanly, the robot's body first."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from time import monotonic, sleep
+from time import monotonic
 from types import TracebackType
 
 from tulip_ros import transport
+from tulip_ros.ending import end_in_order
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
+from tulip_ros.nodes import DRIVER
 from tulip_ros.plan import Start
 
 FIRST_PAUSE, LONGEST_PAUSE = 0.2, 10.0  # [s] before a restart; doubles with each death in a row
 SETTLED = 20.0  # [s] of life after which earlier deaths are forgotten
 DEATHS = 6  # in a row, after which a node is given up
-PATIENCE = 5.0  # [s] to end by itself after SIGTERM, before SIGKILL
 RESTARTS_VARIABLE = "TULIP_RESTARTS"
 """Environment variable that tells a node how many times it was started again."""
 DIES_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl(2)
@@ -110,17 +111,18 @@ class Launcher:
         return tuple(process.state() for process in self._processes)
 
     def stop(self) -> None:
-        """End all processes: the recorder last, so that it sees the others end. Leave nothing of theirs behind."""
-        recorders = [process for process in self._processes if process.is_recorder]
-        _end([process for process in self._processes if process not in recorders])
-        _end(recorders)
+        """End all processes: the body's driver first, the recorder last. Leave nothing of theirs behind."""
+        drivers = [process for process in self._processes if process.node == DRIVER]
+        recorders = [process for process in self._processes if process.node == "recorder"]
+        others = [process for process in self._processes if process not in (*drivers, *recorders)]
+        end_in_order(drivers, others, recorders)
         # Not only after a kill: now and then Fast DDS leaves a port behind of nodes that end at the same time.
         transport.remove_leftovers()
 
 
 class _Process:
     def __init__(self, start: Start, log_folder: Path) -> None:
-        self.name, self._start = start.full_name, start
+        self.name, self.node, self._start = start.full_name, start.name, start
         file = self.name.replace("/", ".")
         self._log = log_folder / f"{file}.log"
         self._command = start.command(log_folder / f"{file}.yaml")
@@ -132,10 +134,6 @@ class _Process:
         self._given_up = False
         self._ended = False
         self._exit_code: int | None = None
-
-    @property
-    def is_recorder(self) -> bool:
-        return self._start.name == "recorder"
 
     def start(self) -> None:
         with open(self._log, "ab") as log:
@@ -215,17 +213,6 @@ class _Process:
     def _tail(self) -> str:
         lines = self._log.read_text(errors="replace").splitlines()
         return "\n".join(f"  {line}" for line in lines[-TAIL:])
-
-
-def _end(processes: Sequence[_Process]) -> None:
-    for process in processes:
-        process.signal(signal.SIGTERM)
-    deadline = monotonic() + PATIENCE
-    while monotonic() < deadline and not all(process.has_ended() for process in processes):
-        sleep(0.02)
-    for process in processes:
-        process.signal(signal.SIGKILL)
-        process.forget()
 
 
 def _die_with_parent(parent: int) -> None:

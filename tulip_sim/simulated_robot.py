@@ -93,6 +93,14 @@ class SimulatedRobot:
         """Give a command to the driver at a time [ns]; return "" or the reason why it did not take it."""
         return self._driver.accept(command, now)
 
+    def limp(self, reason: str) -> None:
+        """Take all torque from the joints, and refuse commands until `release`."""
+        self._driver.limp(reason)
+
+    def release(self) -> None:
+        """Take commands again; every joint stays limp until its next one."""
+        self._driver.release()
+
     def silent_joints(self, now: int) -> tuple[str, ...]:
         """Return the joints that are only damped or limp at a time [ns], since nobody commands them any more."""
         return self._driver.silent_joints(now)
