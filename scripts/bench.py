@@ -43,6 +43,7 @@ from tulip_sim.bench import (
     simcheck,
     strategy,
     stress,
+    transport,
     vision,
     walk,
 )
@@ -51,6 +52,7 @@ from tulip_view.fuzz import bench as fuzz
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress, engines),
+    transport,
     *(simcheck, vision, localization, ball, head, latency, log, faces, identify, dynamics, fuzz),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
