@@ -70,12 +70,12 @@ def summarize(rows: list[Row]) -> list[str]:
         f" {python:.1f} s here, is in these times. *Pictures*: {pictures.WIDTH}x{pictures.HEIGHT} bgr8,"
         f" {rate} a second, from one node to two others; milliseconds from before they are sent until the callback has"
         " them, and processor time of sender and one receiver together. *Kill*: the other receiver is killed with"
-        " `kill -9`: pictures that the first one then lost, the longest that one took to be sent, and what the dead"
-        " process leaves in memory. Medians, and in brackets the greatest.",
+        " `kill -9`: pictures that the first one then lost, and the longest that one took to be sent. Medians, and in"
+        " brackets the greatest.",
         "",
         "| transport | restart: head matched | flows | user_input matched | latched comes | pictures: median | 99 %"
-        " | most | lost | cores | kill: lost | sending | left |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        " | most | lost | cores | kill: lost | sending |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for way, words in WAYS.items():
         own = [row for row in rows if row["transport"] == way]
@@ -91,7 +91,6 @@ def summarize(rows: list[Row]) -> list[str]:
         cells.append(f"{np.median([row['sender [core]'] + row['receiver [core]'] for row in own]):.2f}")
         cells.append(_lost(own, " after the kill"))
         cells.append(_told([row["longest sending after the kill [ms]"] for row in own], "ms"))
-        cells.append(f"{np.median([row['left by the kill [MB]'] for row in own]):.0f} MB")
         lines.append(f"| {' | '.join(cells)} |")
     return lines
 
