@@ -60,44 +60,48 @@ def _small(folder: Path) -> Path:
 
 def summarize(rows: list[Row]) -> list[str]:
     """Return a table with a line for each transport."""
-    python = np.median([row["start of Python [s]"] for row in rows])
     rate = round(1.0 / pictures.PERIOD)
     lines = [
         f"Each transport in turn, {max(row['round'] for row in rows)} rounds. *Restart*: `kill -9` of a node, which is"
-        f" at once started again, {restarts.KILLS} times a round and node beside a body without physics and motion"
-        " control: seconds until the others have its topic in their graph, and until a message of the new process comes"
-        " (`head` must hear the driver for that; `user_input` has a latched topic). The start of Python itself,"
-        f" {python:.1f} s here, is in these times. *Pictures*: {pictures.WIDTH}x{pictures.HEIGHT} bgr8,"
+        f" at once started again, {restarts.KILLS} times a round and node, beside a body without physics and motion"
+        " control: until another node has its topic in its graph (matched), and until a message of the new process"
+        " comes (flows; `head` must hear the driver for that, `user_input` has a latched topic). Most of that is the"
+        " start of Python: since it joined is the part from when its sockets are open, which is the transport's."
+        f" *Pictures*: {pictures.WIDTH}x{pictures.HEIGHT} bgr8,"
         f" {rate} a second, from one node to two others; milliseconds from before they are sent until the callback has"
         " them, and processor time of sender and one receiver together. *Kill*: the other receiver is killed with"
         " `kill -9`: pictures that the first one then lost, and the longest that one took to be sent. Medians, and in"
         " brackets the greatest.",
         "",
-        "| transport | restart: head matched | flows | user_input matched | latched comes | pictures: median | 99 %"
+        "| transport | restart: head matched | flows | since it joined | user_input matched | flows | since it joined"
+        " | pictures: median | 99 %"
         " | most | lost | cores | kill: lost | sending |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for way, words in WAYS.items():
         own = [row for row in rows if row["transport"] == way]
         if not own:
             continue
         cells = [words if way != "auto" else f"auto: here {own[0]['profile']}"]
-        for name in ("head matched", "head flowing", "user_input matched", "user_input flowing"):
-            cells.append(_told([time for row in own for time in row[f"{name} [s]"]], "s"))
+        for node in restarts.KILLED:
+            joined, matched, flowing = (
+                np.concatenate([row[f"{node} {moment} [s]"] for row in own]) for moment in restarts.MOMENTS
+            )
+            cells += [_told(matched, "s"), _told(flowing, "s"), _told(flowing - joined, "s")]
         for name in ("median [ms]", "99 % [ms]"):
             cells.append(f"{np.median([row[name] for row in own]):.1f} ms")
         cells.append(f"{max(row['most [ms]'] for row in own):.0f} ms")
         cells.append(_lost(own, ""))
         cells.append(f"{np.median([row['sender [core]'] + row['receiver [core]'] for row in own]):.2f}")
         cells.append(_lost(own, " after the kill"))
-        cells.append(_told([row["longest sending after the kill [ms]"] for row in own], "ms"))
+        cells.append(_told(np.array([row["longest sending after the kill [ms]"] for row in own]), "ms"))
         lines.append(f"| {' | '.join(cells)} |")
     return lines
 
 
-def _told(values: list[float], unit: str) -> str:
+def _told(values: np.ndarray, unit: str) -> str:
     digits = 2 if unit == "s" else 0
-    return f"{np.median(values):.{digits}f} ({max(values):.{digits}f}) {unit}"
+    return f"{np.median(values):.{digits}f} ({values.max():.{digits}f}) {unit}"
 
 
 def _lost(rows: list[Row], when: str) -> str:

@@ -7,10 +7,10 @@ the new process hears the driver, and is heard itself. Node `user_input` has a l
 from __future__ import annotations
 
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,37 +26,35 @@ KILLS = 4  # of each node
 BETWEEN = 1.0  # [s] between two kills
 OLD = 0.1  # [s] after a kill in which messages may still be the dead process's; a new one takes longer to start
 PATIENCE = 60.0  # [s]
+MOMENTS = ("joined", "matched", "flowing")
+"""Its sockets are open; others have its topic in their graph; the first message of the new process comes."""
 KILLED = {"head": topics.HEAD_JOINT_COMMAND, "user_input": topics.USER_COMMAND}
 
 
 def measure() -> Row:
-    """Kill each node several times; return the times [s] since the kill.
+    """Kill each node several times; return the times [s] of each of `MOMENTS` since the kill.
 
     Raises:
         RuntimeError: if a node does not come.
     """
-    begin = time.monotonic()
-    subprocess.run([sys.executable, "-c", "import tulip_motion.head_node"], check=True)
-    row: Row = {"start of Python [s]": round(time.monotonic() - begin, 3)}
+    row: Row = {}
     with (
         tempfile.TemporaryDirectory(prefix="tulip_log_") as scratch,
         Launcher(make_plan(["motion"], "echo")),
         session(lambda: ComponentNode("watcher"), arguments=[], handle_signals=False) as (watcher, spin),
     ):
         for start in make_plan(list(KILLED), None):
-            matched, flowing = _kill(start, Path(scratch), watcher, spin)
-            row |= {f"{start.name} matched [s]": matched, f"{start.name} flowing [s]": flowing}
+            times = _kill(start, Path(scratch), watcher, spin)
+            row |= {f"{start.name} {what} [s]": [each[column] for each in times] for column, what in enumerate(MOMENTS)}
     return row
 
 
-def _kill(
-    start: Start, folder: Path, watcher: ComponentNode, spin: Callable[[float], None]
-) -> tuple[list[float], list[float]]:
+def _kill(start: Start, folder: Path, watcher: ComponentNode, spin: Callable[[float], None]) -> list[tuple[float, ...]]:
     topic = KILLED[start.name]
     came: list[float] = []
     topic.subscribe_from(watcher, lambda _: came.append(time.monotonic()), raw=True)
     command = start.command(folder / f"{start.name}.yaml")
-    matched, flowing = [], []
+    times = []
     process = subprocess.Popen(command)
     try:
         _wait(lambda: came, spin, topic)
@@ -69,14 +67,25 @@ def _kill(
             process.kill()
             process.wait()
             process = subprocess.Popen(command)
+            _wait(partial(_has_sockets, process.pid), spin, topic)
+            joined = time.monotonic()
             _wait(partial(_is_new, watcher, topic, before), spin, topic)
-            matched.append(round(time.monotonic() - killed, 3))
+            matched = time.monotonic()
             _wait(partial(_came, came, killed + OLD), spin, topic)
-            flowing.append(round(next(moment for moment in came if moment > killed + OLD) - killed, 3))
+            flowing = next(moment for moment in came if moment > killed + OLD)
+            times.append(tuple(round(moment - killed, 3) for moment in (joined, matched, flowing)))
     finally:
         process.kill()
         process.wait()
-    return matched, flowing
+    return times
+
+
+def _has_sockets(pid: int) -> bool:
+    for path in Path(f"/proc/{pid}/fd").glob("*"):
+        with suppress(FileNotFoundError):  # closed meanwhile
+            if path.readlink().name.startswith("socket:"):
+                return True
+    return False
 
 
 def _is_new(watcher: ComponentNode, topic: Topic, before: set[tuple[int, ...]]) -> bool:
