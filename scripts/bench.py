@@ -78,8 +78,11 @@ def chosen(bench: Bench, options: Sequence[str]) -> Bench:
         return bench
     if bench.choose is None:
         raise BadInputError(f"Bench {bench.name} has no options; leave out --option.")
+    pairs = [each.partition("=") for each in options]
+    if not all(name and sign for name, sign, _ in pairs):
+        raise BadInputError(f"--option is {', '.join(options)}; expected NAME=VALUE.")
     try:
-        return replace(bench, trials=bench.choose(dict(each.split("=", 1) for each in options)))
+        return replace(bench, trials=bench.choose({name: value for name, _, value in pairs}))
     except ValueError as error:
         raise BadInputError(f"--option of bench {bench.name}: {error}.") from error
 
