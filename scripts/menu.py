@@ -21,7 +21,7 @@ from tulip_view.menu.robot_link import linked
 def main(
     namespace: Annotated[str, typer.Option(help="Namespace of the robot, as in striker.")] = "",
 ) -> None:
-    """Start, stop, walk test, kick test, push, record, identify, health of the nodes; key l makes the legs limp."""
+    """Start, stop, walk test, kick test, push, record, identify, health of the nodes; key l is the emergency stop."""
     try:
         with linked(check_namespace(namespace)) as robot:
             Menu(robot).run()
