@@ -32,6 +32,7 @@ from tulip_motion.interface import (
     Support,
     WalkCommand,
     WalkMode,
+    Whereabouts,
 )
 from tulip_motion.inverse_kinematics import rotation_z
 from tulip_motion.kick import Kick, moved
@@ -264,6 +265,23 @@ class Motion:
             reason=self._reason,
             notes=self.notes,
         )
+
+    def whereabouts(self) -> Whereabouts:
+        """Return what `continue_from` takes, as of the last tick."""
+        x, y = self._ground.position
+        reckoning = self._dead_reckoning
+        return Whereabouts(
+            self._stamp,
+            (float(x), float(y)),
+            self._estimator.heading_offset,
+            reckoning.distance,
+            reckoning.uncertainty.ravel().tolist(),
+        )
+
+    def continue_from(self, before: Whereabouts) -> None:
+        """Go on in the odom of motion control that has died; call before the first tick."""
+        self._estimator.continue_from(before.heading_offset, (before.base[0], before.base[1]))
+        self._dead_reckoning.continue_from(before.distance, np.reshape(before.uncertainty, (4, 4)))
 
     def save_learning(self) -> None:
         """Write what was learned since the last time to `learning_file`, if there is one."""

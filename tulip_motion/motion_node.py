@@ -11,7 +11,7 @@ from rclpy.task import Future
 
 from tulip_description.robot import load_robot
 from tulip_motion.footsteps import Footstep
-from tulip_motion.interface import KickGoal, KickKind, MotionMode, Side, WalkCommand, WalkMode
+from tulip_motion.interface import KickGoal, KickKind, MotionMode, Side, WalkCommand, WalkMode, Whereabouts
 from tulip_motion.messages import (
     body_transforms,
     footsteps_to_message,
@@ -51,6 +51,8 @@ class MotionNode(ComponentNode):
         super().__init__("motion")
         self._settings = self.load(MotionParameters())
         self._kick: _RunningKick | None = None
+        kept = self.keepsake.read()
+        self._before = Whereabouts(**kept) if kept else None
         try:
             self._begin()
         except ValueError as error:  # a number that does not fit this robot's legs
@@ -107,6 +109,10 @@ class MotionNode(ComponentNode):
         except ValueError as error:
             self.health.count("refused sensors", str(error))
             return
+        if self._before is not None:  # motion control has died, and goes on in its odom, unless time began anew
+            if sensors.stamp >= self._before.stamp:
+                self._motion.continue_from(self._before)
+            self._before = None
         if self._walking_until and sensors.stamp > self._walking_until:
             self.health.count("walk command too old", "strategy is silent: the robot stops walking")
             self._motion.command(WalkCommand(sensors.stamp, WalkMode.STAND))
@@ -123,6 +129,7 @@ class MotionNode(ComponentNode):
         self._odometry.publish(odometry_to_message(odometry))
         self._tf.publish(body_transforms(odometry))
         self._state.publish(motion_state_to_message(state, odometry.distance))
+        self.keepsake.keep(self._motion.whereabouts()._asdict())
         footsteps = self._motion.footsteps
         if footsteps != self._footsteps_told:
             self._footsteps_told = footsteps

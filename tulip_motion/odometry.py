@@ -65,6 +65,21 @@ class DeadReckoning:
         if self._stamp is None:
             self._stamp, self._position = stamp, position
 
+    @property
+    def uncertainty(self) -> Array:
+        """(4, 4) covariance of x, y [m], yaw [rad] and its drift [rad/s] at the last step or start."""
+        return self._covariance.copy()
+
+    def continue_from(self, distance: float, uncertainty: Array) -> None:
+        """Go on from what another one has counted; what the robot did since then is known as roughly as after a fall.
+
+        Args:
+            distance: Path length walked [m].
+            uncertainty: (4, 4) of the other one.
+        """
+        self.distance, self._covariance = distance, uncertainty.copy()
+        self.fall()
+
     def step(
         self, stamp: int, position: Point, before: Sequence[Pose2D], after: Sequence[Pose2D], signs: SlipSigns
     ) -> None:

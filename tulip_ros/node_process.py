@@ -13,9 +13,10 @@ from functools import partial
 from pathlib import Path
 from time import monotonic
 
-from tulip_ros import heartbeat
+from tulip_ros import heartbeat, keepsake
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
 from tulip_ros.heartbeat import Pulse
+from tulip_ros.keepsake import Memory
 from tulip_ros.nodes import DRIVER, NodeEntry
 from tulip_ros.plan import Start
 from tulip_ros.standby import Role
@@ -150,6 +151,7 @@ class NodeProcess:
         self._log = log_folder / f"{file}.log"
         self._command = start.command(log_folder / f"{file}.yaml")
         self._standby = standby
+        self._memory = Memory(file)
         self._child: Child | None = None
         self._started = 0.0
         self._restart_at = 0.0
@@ -167,7 +169,7 @@ class NodeProcess:
 
     def start(self) -> None:
         """Start it, from a process that waits if there is one."""
-        environment = {RESTARTS_VARIABLE: str(self.starts)}
+        environment = {RESTARTS_VARIABLE: str(self.starts), keepsake.VARIABLE: self._memory.path}
         self._child = self._from_standby(environment) or Child(self._command, self._log, environment)
         self._started = monotonic()
         self.starts += 1
@@ -249,6 +251,7 @@ class NodeProcess:
         if self._child is not None:
             self._exit_code = self._child.end()
         self._child, self._ended = None, True
+        self._memory.close()
 
     def _refusal(self) -> str:
         """Return the node's own words: what follows "error: " in its log."""

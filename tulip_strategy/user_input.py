@@ -56,6 +56,11 @@ class UserInput:
         request = UserRequest.PLAY if parameters.autostart else UserRequest.STOP
         self._command = UserCommand(stamp, request, parameters.strategy)
 
+    def recall(self, command: UserCommand) -> None:
+        """Go on with the wish that held when this program died."""
+        if command.strategy in self._strategies:
+            self._command = command
+
     @property
     def command(self) -> UserCommand:
         """The command that holds."""

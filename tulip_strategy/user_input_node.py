@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from tulip_ros import topics
 from tulip_ros.errors import BadInputError
 from tulip_ros.run import ComponentNode, run
 from tulip_strategy.behaviour.tree import STRATEGIES
-from tulip_strategy.interface import UserRequest
+from tulip_strategy.interface import UserCommand, UserRequest
 from tulip_strategy.messages import user_command_to_message
 from tulip_strategy.user_input import UserInput, UserInputParameters
 
@@ -33,7 +34,8 @@ class UserInputNode(ComponentNode):
         super().__init__("user_input")
         self._settings = self.load(UserInputParameters())
         self._command = self.sender(topics.USER_COMMAND)
-        self.begin_anew()
+        self._make_core()
+        self._recall()
         self.follow_clock()
         self.listen(topics.USER_WISH, self._on_published_wish)
         self.create_service(topics.SET_USER_COMMAND.type, topics.SET_USER_COMMAND.name, self._on_wish)
@@ -41,11 +43,22 @@ class UserInputNode(ComponentNode):
             self.create_service(service.type, service.name, self._trigger(request))
 
     def begin_anew(self) -> None:
-        """Make the core and publish the wish that it starts with."""
+        """Publish the wish that the core starts with."""
+        self._make_core()
+        self._publish()
+
+    def _make_core(self) -> None:
         try:
             self._input = UserInput(self._settings, tuple(STRATEGIES), self._now())
         except ValueError as error:
             raise BadInputError(f"Parameters of node 'user_input': {error}") from error
+
+    def _recall(self) -> None:
+        """Publish the wish to begin with: the one that held when this node died, so that no stop is forgotten."""
+        kept = self.keepsake.read()
+        if kept:
+            kept["request"], kept["velocity"] = UserRequest(kept["request"]), tuple(kept["velocity"])
+            self._input.recall(UserCommand(**kept))
         self._publish()
 
     def _on_wish(self, request: Any, response: Any) -> Any:
@@ -77,6 +90,7 @@ class UserInputNode(ComponentNode):
 
     def _publish(self) -> None:
         self._command.publish(user_command_to_message(self._input.command))
+        self.keepsake.keep(asdict(self._input.command))
 
     def _now(self) -> int:
         """Return the time [ns]: a wish carries no stamp of its own."""
