@@ -278,10 +278,11 @@ class Motion:
             reckoning.uncertainty.ravel().tolist(),
         )
 
-    def continue_from(self, before: Whereabouts) -> None:
-        """Go on in the odom of motion control that has died; call before the first tick."""
+    def continue_from(self, before: Whereabouts, stamp: int) -> None:
+        """Go on at a stamp [ns] in the odom of motion control that has died; call before the first tick."""
+        gap = (stamp - before.stamp) * 1e-9
         self._estimator.continue_from(before.heading_offset, (before.base[0], before.base[1]))
-        self._dead_reckoning.continue_from(before.distance, np.reshape(before.uncertainty, (4, 4)))
+        self._dead_reckoning.continue_from(before.distance, np.reshape(before.uncertainty, (4, 4)), gap)
 
     def save_learning(self) -> None:
         """Write what was learned since the last time to `learning_file`, if there is one."""

@@ -111,7 +111,7 @@ class MotionNode(ComponentNode):
             return
         if self._before is not None:  # motion control has died, and goes on in its odom, unless time began anew
             if sensors.stamp >= self._before.stamp:
-                self._motion.continue_from(self._before)
+                self._motion.continue_from(self._before, sensors.stamp)
             self._before = None
         if self._walking_until and sensors.stamp > self._walking_until:
             self.health.count("walk command too old", "strategy is silent: the robot stops walking")
