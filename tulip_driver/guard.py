@@ -99,23 +99,22 @@ class Guard:
         reason = self._fault(command)
         if reason:
             return reason
-        if self._limp:
-            return f"the robot was made limp ({self._limp}); release it first"
         group = self._groups.get(command.names)
         if group is None:
             group = self._groups[command.names] = _Group(np.array([self._index[name] for name in command.names]))
         elif command.sequence <= group.sequence and now < group.expires:
             # After a time-out any sequence will do: the sender may have been restarted and count from zero.
             return f"sequence is {command.sequence}; expected more than {group.sequence}, the last one taken"
+        group.sequence, group.stamp = command.sequence, command.stamp
+        group.expires = group.next_change = now + self._times.time_to_live * MILLISECOND
+        if self._limp:  # its sender lives, that is all that counts
+            return f"the robot was made limp ({self._limp}); release it first"
         joints = group.joints
         self.position[joints] = np.clip(command.position, self._lower[joints], self._upper[joints])
         self.velocity[joints] = command.velocity
         self.effort[joints] = command.effort
         self.stiffness[joints] = command.stiffness
         self.damping[joints] = command.damping
-        group.sequence, group.stamp = command.sequence, command.stamp
-        group.expires = now + self._times.time_to_live * MILLISECOND
-        group.next_change = group.expires
         self._next_change = min(other.next_change for other in self._groups.values())
         return ""
 
@@ -137,11 +136,6 @@ class Guard:
         self._next_change = FOREVER
         for values in (self.velocity, self.effort, self.stiffness, self.damping):
             values[:] = 0.0
-
-    @property
-    def limp_reason(self) -> str:
-        """Why the robot was made limp; "" if it was not."""
-        return self._limp
 
     @property
     def commanded(self) -> tuple[str, ...]:

@@ -101,11 +101,6 @@ class BodyLoop:
         """Joints whose last command is older than its time-to-live."""
         return self._guard.silent_joints(self.now)
 
-    @property
-    def limp_reason(self) -> str:
-        """Why the robot was made limp; "" if it was not."""
-        return self._guard.limp_reason
-
     def accept(self, command: JointCommand) -> str:
         """Take a command for a group of joints; return "" or why it is not taken."""
         if self.sensors is None:
@@ -128,7 +123,7 @@ class BodyLoop:
         self._limiter.begin_anew()
 
     def tick(self) -> Sensors | None:
-        """Exchange once.
+        """Exchange once. A body that asks for an emergency stop is limp from the next exchange on, until `release`.
 
         Returns:
             A new reading, in the driver's time; None if the body had no new one, or one that cannot be used.
@@ -158,6 +153,8 @@ class BodyLoop:
         if self._clock is not None:
             reading = replace(reading, stamp=self._body_clock.to_host(reading.stamp, self._clock()))
         self.sensors, self._arrived = reading, monotonic_ns()
+        if reading.emergency:
+            self.limp(reading.emergency)
         return reading
 
     def _forget_time(self) -> None:

@@ -82,6 +82,7 @@ class Motion:
         self._soles = robot.feet
         self._reach = reach(p, robot)
         self._command = WalkCommand(0, WalkMode.STAND)
+        self._stopped = ""  # why an emergency stop holds
         self._mode = MotionMode.STAND
         self._reason = ""
         self._gait: Walking | PaperGait | Kick | None = None
@@ -118,7 +119,21 @@ class Motion:
         goal = (command.goal.x, command.goal.y, command.goal.yaw)
         if not all(math.isfinite(value) for value in goal):
             raise ValueError(f"walk goal is {goal}; expected finite numbers")
-        self._command = command
+        if not self._stopped:
+            self._command = command
+
+    def stop(self, reason: str) -> None:
+        """Be limp from the next tick on, whatever is commanded, until `release`.
+
+        Args:
+            reason: In words, not empty.
+        """
+        self._stopped = reason
+        self._command = WalkCommand(self._stamp, WalkMode.LIMP)
+
+    def release(self) -> None:
+        """Take commands again; the legs stay limp until one says otherwise."""
+        self._stopped = ""
 
     @property
     def stance(self) -> Side:
@@ -142,6 +157,8 @@ class Motion:
 
     def start_kick(self, goal: KickGoal) -> str:
         """Begin a kick; return "" or the reason why not."""
+        if self._stopped:
+            return self._stopped
         if self._kick is not None and not self._kick.finished:
             return "another kick is under way"
         if goal.kind is KickKind.WALKING:
@@ -370,7 +387,7 @@ class Motion:
         if self._broken or fall:
             self._fall(self._broken or fall)
         elif wanted is WalkMode.LIMP:
-            self._mode, self._reason = MotionMode.LIMP, "limp on request"
+            self._mode, self._reason = MotionMode.LIMP, self._stopped or "limp on request"
         elif self._gait is not None and self._gait.finished:
             self._steps_before += self._steps_of_gait
             if isinstance(self._gait, Walking) and self._gait.kick is not None:

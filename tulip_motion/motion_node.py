@@ -9,6 +9,7 @@ from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.task import Future
 
+from tulip_description.emergency_stop import StopWord
 from tulip_description.robot import load_robot
 from tulip_motion.footsteps import Footstep
 from tulip_motion.interface import KickGoal, KickKind, MotionMode, Side, WalkCommand, WalkMode, Whereabouts
@@ -27,6 +28,7 @@ from tulip_motion.saturation import Saturation
 from tulip_msgs.action import Kick
 from tulip_msgs.msg import WalkCommand as WalkCommandMessage
 from tulip_ros import topics
+from tulip_ros.emergency_stop import StopLink
 from tulip_ros.errors import BadInputError
 from tulip_ros.finding import Finding, Level
 from tulip_ros.matching import SameStamp
@@ -53,6 +55,7 @@ class MotionNode(ComponentNode):
         self._kick: _RunningKick | None = None
         kept = self.keepsake.read()
         self._before = Whereabouts(**kept) if kept else None
+        self._emergency_stop = StopLink(self, "motion", self._on_emergency_stop)
         try:
             self._begin()
         except ValueError as error:  # a number that does not fit this robot's legs
@@ -93,6 +96,8 @@ class MotionNode(ComponentNode):
         self._sensors = SameStamp("joint_states", "imu", "foot_forces")
         self._tick = 0
         self._walking_until = 0
+        if self._emergency_stop.engaged:  # that time began anew is no release
+            self._on_emergency_stop(self._emergency_stop.word)
 
     def destroy_node(self) -> None:
         """Keep what was learned, and end."""
@@ -180,6 +185,12 @@ class MotionNode(ComponentNode):
             self.health.count("refused walk command", f"walk command refused: {error}")
             return
         self._walking_until = command.stamp + COMMAND_LIFE if command.mode is WalkMode.WALK else 0
+
+    def _on_emergency_stop(self, word: StopWord) -> None:
+        if word.engaged:
+            self._motion.stop(str(word))
+        else:
+            self._motion.release()
 
     async def _execute_kick(self, handle: ServerGoalHandle) -> Kick.Result:
         """Kick, or refuse: a goal is always accepted first, since only a result can carry the reason."""

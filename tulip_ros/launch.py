@@ -1,4 +1,4 @@
-"""Starts nodes, each a process; restarts one that died or hangs; ends all of them cleanly.
+"""Starts nodes, each a process; restarts one that died or hangs; ends all of them cleanly, the robot's body first.
 
 A node that dies is started again: at once the first time, then after pauses that double. One that dies again and again
 is given up, and the robot is brought to stand still (see `tulip_ros.safe_state`). One that gives no sign of life while
@@ -14,15 +14,16 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Thread
-from time import monotonic, sleep
+from time import monotonic
 from types import TracebackType
 
 from tulip_ros import transport
+from tulip_ros.ending import end_in_order
 from tulip_ros.errors import BadInputError
 from tulip_ros.node_process import NodeProcess, ProcessState, Standby, needed
+from tulip_ros.nodes import DRIVER
 from tulip_ros.plan import Start
 
-PATIENCE = 5.0  # [s] to end by itself after SIGTERM, before SIGKILL
 HUNG = 10.0  # [s] without a sign of life, of which one comes each second: no callback of a node takes a tenth of that
 LIVELY = 3.0  # [s] since the last sign of some other node: else it is the machine that stands still, not the node
 ABSENT = 2.0  # [s] between two polls after which the launcher itself was held up, and begins to watch anew
@@ -65,7 +66,7 @@ class Launcher:
         modules = [name for name in dict.fromkeys(modules) if name.startswith("tulip_")]
         self._standby = Standby(modules, log_folder / "standby.log") if modules else None
         self._processes = [NodeProcess(start, log_folder, self._standby) for start in plan]
-        self._requests: dict[str, subprocess.Popen[bytes]] = {}  # to stand still, by namespace
+        self._requests: dict[tuple[str, str], subprocess.Popen[bytes]] = {}  # by namespace and wish, see safe_state
         self._tidying: Thread | None = None
         self._untidy = False
         self._last_start = self._last_poll = self._watching_since = 0.0
@@ -123,15 +124,16 @@ class Launcher:
         return tuple(process.state() for process in self._processes)
 
     def stop(self) -> None:
-        """End all processes: the recorder last, so that it sees the others end. Leave nothing of theirs behind."""
+        """End all processes: the body's driver first, the recorder last. Leave nothing of theirs behind."""
         for request in self._requests.values():
             request.kill()
             request.wait()
         if self._standby is not None:
             self._standby.end()
+        drivers = [process for process in self._processes if process.entry.name == DRIVER]
         recorders = [process for process in self._processes if process.entry.name == "recorder"]
-        _end([process for process in self._processes if process not in recorders])
-        _end(recorders)
+        others = [process for process in self._processes if process not in (*drivers, *recorders)]
+        end_in_order(drivers, others, recorders)
         if self._tidying is not None:
             self._tidying.join()
         # Not only after a kill: now and then Fast DDS leaves a port behind of nodes that end at the same time.
@@ -153,35 +155,41 @@ class Launcher:
         """Bring a robot without one of its nodes to stand still."""
         said = [f"{process.name} is missing: the robot of {process.namespace or 'this graph'} must not play on"]
         if process.entry.name == "motion":
-            return [*said, "without motion control the driver lets the legs sink: the robot is limp"]
+            self._tell(process.namespace, "limp")
+            return [*said, "without motion control the robot is limp"]
         if not any(each.entry.name == "user_input" and not each.given_up for each in self._robot(process.namespace)):
             return said + self._end_strategy(process.namespace)
-        if process.namespace not in self._requests:
-            command = [sys.executable, "-m", "tulip_ros.safe_state", process.namespace]
+        self._tell(process.namespace, "stand")
+        return said
+
+    def _tell(self, namespace: str, wish: str) -> None:
+        """Have a robot told what to do, beside the work."""
+        if (namespace, wish) not in self._requests:
+            command = [sys.executable, "-m", "tulip_ros.safe_state", namespace, wish]
             with open(self.log_folder / "safe_state.log", "ab") as log:
-                self._requests[process.namespace] = subprocess.Popen(
+                self._requests[namespace, wish] = subprocess.Popen(
                     command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
                 )
-        return said
 
     def _heed_answers(self) -> list[str]:
         """Take the answers to what `_stand_still` asked for."""
         said = []
-        for namespace, request in list(self._requests.items()):
+        for (namespace, wish), request in list(self._requests.items()):
             code = request.poll()
             if code is None:
                 continue
-            del self._requests[namespace]
-            said += (
-                ["node user_input has told the robot to stop and stand"] if code == 0 else self._end_strategy(namespace)
-            )
+            del self._requests[namespace, wish]
+            if code == 0:
+                said.append("the robot was told to stand" if wish == "stand" else "the emergency stop holds")
+            elif wish == "stand":
+                said += self._end_strategy(namespace)
         return said
 
     def _end_strategy(self, namespace: str) -> list[str]:
         """End who tells motion control to walk; it stops by itself then."""
         robot = self._robot(namespace)
         strategies = [process for process in robot if process.entry.name == "strategy" and not process.has_ended()]
-        _end(strategies)
+        end_in_order((), strategies, ())
         return [f"{process.name} was ended: motion control stops walking and stands" for process in strategies]
 
     def _robot(self, namespace: str) -> list[NodeProcess]:
@@ -193,13 +201,3 @@ class Launcher:
             self._tidying = Thread(target=transport.remove_leftovers)
             self._tidying.start()
             self._untidy = False
-
-
-def _end(processes: Sequence[NodeProcess]) -> None:
-    for process in processes:
-        process.signal(signal.SIGTERM)
-    deadline = monotonic() + PATIENCE
-    while monotonic() < deadline and not all(process.has_ended() for process in processes):
-        sleep(0.02)
-    for process in processes:
-        process.end()

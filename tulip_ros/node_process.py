@@ -246,8 +246,8 @@ class NodeProcess:
         """Return whether no process of it lives."""
         return self._child is None or self._child.process.poll() is not None
 
-    def end(self) -> None:
-        """Kill it if it lives, and do not start it again."""
+    def forget(self) -> None:
+        """Wait for its end, which is near, and do not start it again."""
         if self._child is not None:
             self._exit_code = self._child.end()
         self._child, self._ended = None, True

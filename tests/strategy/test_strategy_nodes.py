@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -176,6 +177,31 @@ def test_user_input_takes_wishes_and_refuses_bad_ones() -> None:
         until(answer.done)
         until(lambda: len(commands) == 3)
         assert commands[2].request == UserRequest.PLAY
+
+
+def test_a_walk_test_goes_on_while_its_user_gives_signs_and_ends_soon_after_the_last_one() -> None:
+    with running(UserInputNode, "walk_test_lifetime:=1.0") as (node, until):
+        commands: list[Any] = []
+        topics.USER_COMMAND.subscribe_from(node, commands.append)
+        wishes, signs = topics.USER_WISH.publish_from(node), topics.USER_PRESENT.publish_from(node)
+        until(lambda: bool(commands) and wishes.get_subscription_count() == signs.get_subscription_count() == 1)
+        wishes.publish(topics.USER_WISH.message(request=UserRequest.WALK_TEST.value, velocity=[0.1, 0.0, 0.0]))
+        begin = time.monotonic()
+
+        def goes_on() -> bool:
+            signs.publish(topics.USER_PRESENT.message(data="face"))
+            time.sleep(0.02)
+            return time.monotonic() - begin > 2.0
+
+        until(goes_on)
+        assert [command.request for command in commands] == [UserRequest.STOP, UserRequest.WALK_TEST]
+        last = time.monotonic()
+        until(lambda: len(commands) == 3)
+        assert commands[2].request == UserRequest.STOP
+        assert time.monotonic() - last > 0.9
+        signs.publish(topics.USER_PRESENT.message(data="face"))  # late ones bring nothing back
+        until(lambda: time.monotonic() - last > 1.5)
+        assert len(commands) == 3
 
 
 def topics_trigger() -> Any:

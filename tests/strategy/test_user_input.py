@@ -58,6 +58,24 @@ def test_a_wish_that_cannot_be_is_refused_in_words_and_changes_nothing(
     assert user.command is before
 
 
+def test_a_walk_test_that_nobody_is_there_for_ends_in_a_stop_and_nothing_else_does() -> None:
+    user = user_input()
+    user.ask(1, UserRequest.WALK_TEST, velocity=(0.2, 0.0, 0.0))
+    assert user.end_walk_test(9)
+    assert user.command == UserCommand(9, UserRequest.STOP, sequence=2)
+    for request in (UserRequest.STOP, UserRequest.PLAY, UserRequest.STAND, UserRequest.KICK_TEST, UserRequest.LIMP):
+        user.ask(10, request)
+        before = user.command
+        assert not user.end_walk_test(11)
+        assert user.command is before
+
+
+@pytest.mark.parametrize("lifetime", [0.0, -1.0, math.inf, math.nan])
+def test_a_walk_test_lives_for_a_time_that_ends(lifetime: float) -> None:
+    with pytest.raises(ValueError, match="walk_test_lifetime"):
+        UserInputParameters(walk_test_lifetime=lifetime)
+
+
 def test_an_unknown_first_strategy_is_named() -> None:
     with pytest.raises(ValueError, match="strategy is 'x'; expected one of: dribble_and_kick"):
         UserInput(UserInputParameters(strategy="x"), STRATEGIES)
