@@ -37,6 +37,7 @@ from tulip_sim.bench import (
     dynamics,
     engines,
     faces,
+    faults,
     head,
     identify,
     ilc,
@@ -60,7 +61,7 @@ from tulip_view.fuzz import bench as fuzz
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress, engines),
-    *(simcheck, vision, localization, ball, head, latency, log, faces, drivers, identify, dynamics, fuzz, soak),
+    *(simcheck, vision, localization, ball, head, latency, log, faces, faults, drivers, identify, dynamics, fuzz, soak),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"

@@ -151,6 +151,11 @@ class Motion:
         return (*gait, *self._tracking.notes, *cells)
 
     @property
+    def broken(self) -> str:
+        """Why the robot cannot be controlled by its sensors, in words; "" as long as it can."""
+        return self._broken
+
+    @property
     def footsteps(self) -> tuple[Footstep, ...]:
         """The next footsteps of the default gait, in odom; none while the robot stands, kicks or lies."""
         return self._gait.footsteps if isinstance(self._gait, Walking) else ()

@@ -167,6 +167,8 @@ class MotionNode(ComponentNode):
 
     def _motion_health(self) -> Finding | None:
         """Tell what motion control notes for as long as it lasts, as a clipped walk command."""
+        if self._motion.broken:
+            return Finding(Level.ERROR, f"{self._motion.broken}: have it mended, then start this node again")
         return Finding(Level.WARNING, "; ".join(self._notes.values())) if self._notes else None
 
     def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:

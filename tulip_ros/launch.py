@@ -69,6 +69,7 @@ class Launcher:
         self._requests: dict[tuple[str, str], subprocess.Popen[bytes]] = {}  # by namespace and wish, see safe_state
         self._tidying: Thread | None = None
         self._untidy = False
+        self._killed = ("", 0)  # name of the process that was killed last since it hung, and which of its lives
         self._last_start = self._last_poll = self._watching_since = 0.0
 
     def __enter__(self) -> Launcher:
@@ -146,8 +147,10 @@ class Launcher:
         for process, beat in beats.items():
             silent = now - max(beat, self._watching_since)
             others = [now - other for each, other in beats.items() if each is not process]
-            if self._hung and silent > self._hung and (not others or min(others) < LIVELY):
+            life = (process.name, process.starts)
+            if self._hung and silent > self._hung and life != self._killed and (not others or min(others) < LIVELY):
                 process.signal(signal.SIGKILL)
+                self._killed = life  # it takes a moment to die
                 said.append(f"{process.name} gives no sign of life for {silent:.0f} s, and is killed")
         return said
 

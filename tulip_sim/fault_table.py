@@ -27,6 +27,7 @@ class Way(Enum):
     STOPPED = "SIGSTOP"
     SLOW = "SIGSTOP for 80 ms, SIGCONT for 20 ms, and so on"
     STALLED = "SIGSTOP for 3 s"
+    HUNG = "SIGSTOP, and nobody continues it"
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class Row:
     @property
     def at_any_time(self) -> bool:
         """Whether it needs no graph of its own: it is made to happen from outside, and ends."""
-        return bool(self.node or self.no_room)
+        return bool(self.node or self.no_room) and self.way is not Way.HUNG
 
 
 GOES_ON, STANDS, LIMP = Reaction
@@ -75,8 +76,12 @@ JOINT_LOOP = ("joint_states", "imu", "foot_forces", "legs/joint_command")
 OTHERS = ("features", "odometry", "world_state", "motion_state", "walk_command", "head_command", "head/joint_command")
 
 
-def _stopped(node: str, reaction: Reaction, because: str, tells: tuple[str, str] = ("", "")) -> Row:
-    return Row(f"{node} stopped", Way.STOPPED.value, reaction, because, tells, node=node, way=Way.STOPPED)
+def _stopped(
+    node: str, reaction: Reaction, because: str, tells: tuple[str, str] = ("", ""), seconds: float = 8.0
+) -> Row:
+    return Row(
+        f"{node} stopped", Way.STOPPED.value, reaction, because, tells, node=node, way=Way.STOPPED, seconds=seconds
+    )
 
 
 def _slow(node: str, because: str) -> Row:
@@ -95,34 +100,35 @@ def _messages(name: str, topics: tuple[str, ...], reaction: Reaction, because: s
     return Row(name, how, reaction, because, disturbed=topics, disturbance=disturbance, free=free)
 
 
-HUNG = "; after 10 s without a sign of life the launcher starts it again"
+AGAIN = "; after 10 s the launcher starts it again"
 ROWS: tuple[Row, ...] = (
     _stopped(
-        "vision", STANDS, "strategy does not walk when pictures stop for 2 s" + HUNG, ("worldmodel", "no features")
+        "vision", STANDS, "strategy does not walk when pictures stop for 2 s" + AGAIN, ("worldmodel", "no features")
     ),
     _stopped(
         "worldmodel",
         STANDS,
-        "strategy is silent without it, and motion control stops walking after 0.5 s" + HUNG,
+        "strategy is silent without it, and motion control stops walking after 0.5 s" + AGAIN,
         ("strategy", "no world_state"),
     ),
     _stopped(
-        "head", GOES_ON, "the head hangs loose; the ball may be lost and searched for" + HUNG, ("driver", "head_pan")
+        "head", GOES_ON, "the head hangs loose; the ball may be lost and searched for" + AGAIN, ("driver", "head_pan")
     ),
     _stopped(
         "motion",
         LIMP,
-        "the driver damps the legs after 0.1 s and lets go of them after 0.6 s" + HUNG,
+        "the driver damps the legs after 0.1 s and lets go of them after 0.6 s" + AGAIN,
         ("driver", "left_hip_yaw"),
+        seconds=4.0,  # then people set it up
     ),
     _stopped(
         "strategy",
         STANDS,
-        "motion control stops walking after 0.5 s without a command" + HUNG,
+        "motion control stops walking after 0.5 s without a command" + AGAIN,
         ("motion", "strategy is silent"),
     ),
-    _stopped("game_input", GOES_ON, "the last word of the referee holds" + HUNG),
-    _stopped("user_input", GOES_ON, "the last wish of the user holds" + HUNG),
+    _stopped("game_input", GOES_ON, "the last word of the referee holds" + AGAIN),
+    _stopped("user_input", GOES_ON, "the last wish of the user holds" + AGAIN),
     Row(
         "simulator stalled",
         Way.STALLED.value,
@@ -131,6 +137,15 @@ ROWS: tuple[Row, ...] = (
         ("motion", "time stands still"),
         node="driver",
         way=Way.STALLED,
+    ),
+    Row(
+        "strategy hung",
+        Way.HUNG.value,
+        GOES_ON,
+        "the launcher kills a node without a sign of life for 10 s while others have some, and starts it again",
+        node="strategy",
+        way=Way.HUNG,
+        seconds=30.0,
     ),
     _slow("vision", "fewer pictures are looked at"),
     _slow("worldmodel", "it works on what it gets, and tells of messages left out"),
