@@ -37,6 +37,7 @@ from tulip_sim.bench import (
     dynamics,
     engines,
     faces,
+    faults,
     head,
     identify,
     ilc,
@@ -61,8 +62,8 @@ from tulip_view.fuzz import bench as fuzz
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress, engines),
-    *(simcheck, vision, localization, ball, head, latency, log, faces, drivers, transport, identify, dynamics, fuzz),
-    soak,
+    *(simcheck, vision, localization, ball, head, latency, log, faces, faults, drivers, transport, identify, dynamics),
+    *(fuzz, soak),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"

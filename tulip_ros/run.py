@@ -44,6 +44,7 @@ from rclpy.timer import Timer
 from tulip_ros import parameters, transport
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, unknown
 from tulip_ros.health import Health
+from tulip_ros.keepsake import Keepsake
 from tulip_ros.time import stamp_of
 from tulip_ros.timeline import JUMP, Arrival, Timeline
 from tulip_ros.topics import Topic
@@ -72,6 +73,7 @@ class ComponentNode(Node):
         """
         super().__init__(name, **options)
         self.health = Health(self)
+        self.keepsake = Keepsake()
         self._timeline = Timeline()
 
     def load(self, defaults: P) -> P:

@@ -340,7 +340,8 @@ class SimulatorNode(ComponentNode, ABC):
                 port.tell_truth(truth, verdict)
         if self._pace_settings.camera:
             for index, port in enumerate(self._ports):
-                if (self._tick - index * CAMERA_TICKS // len(self._ports)) % CAMERA_TICKS == 0:
+                due = (self._tick - index * CAMERA_TICKS // len(self._ports)) % CAMERA_TICKS == 0
+                if due and self.world.robots[index].faults.sees(self.world.stamp):
                     port.take_picture()
         self._tick += 1
         self._pace(spin)

@@ -60,6 +60,11 @@ class UserInput:
         self._command = UserCommand(stamp, request, parameters.strategy)
         self._stopped = ""  # why an emergency stop holds
 
+    def recall(self, command: UserCommand) -> None:
+        """Go on with the wish that held when this program died."""
+        if command.strategy in self._strategies:
+            self._command = command
+
     @property
     def command(self) -> UserCommand:
         """The command that holds."""

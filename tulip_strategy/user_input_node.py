@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from time import monotonic
 from typing import Any
 
@@ -11,7 +12,7 @@ from tulip_ros.emergency_stop import StopLink
 from tulip_ros.errors import BadInputError
 from tulip_ros.run import ComponentNode, run
 from tulip_strategy.behaviour.tree import STRATEGIES
-from tulip_strategy.interface import UserRequest
+from tulip_strategy.interface import UserCommand, UserRequest
 from tulip_strategy.messages import user_command_to_message
 from tulip_strategy.user_input import UserInput, UserInputParameters
 
@@ -42,7 +43,8 @@ class UserInputNode(ComponentNode):
         self._sign = monotonic()  # [s] the last one of whoever has the robot walk
         self._emergency_stop = StopLink(self, "user_input", self._on_emergency_stop)
         self.health.check(self._emergency_stop.finding)
-        self.begin_anew()
+        self._make_core()
+        self._recall()
         self.follow_clock()
         self.listen(topics.USER_WISH, self._on_published_wish)
         self.listen(topics.USER_PRESENT, self._on_sign)
@@ -54,13 +56,24 @@ class UserInputNode(ComponentNode):
             self.create_service(service.type, service.name, answer)
 
     def begin_anew(self) -> None:
-        """Make the core and publish the wish that it starts with."""
+        """Publish the wish that the core starts with."""
+        self._make_core()
+        self._publish()
+
+    def _make_core(self) -> None:
         try:
             self._input = UserInput(self._settings, tuple(STRATEGIES), self._now())
         except ValueError as error:
             raise BadInputError(f"Parameters of node 'user_input': {error}") from error
         if self._emergency_stop.engaged:  # that time began anew is no release
             self._input.stop(self._now(), str(self._emergency_stop.word))
+
+    def _recall(self) -> None:
+        """Publish the wish to begin with: the one that held when this node died, so that no stop is forgotten."""
+        kept = self.keepsake.read()
+        if kept:
+            kept["request"], kept["velocity"] = UserRequest(kept["request"]), tuple(kept["velocity"])
+            self._input.recall(UserCommand(**kept))
         self._publish()
 
     def _on_engage(self, _: Any, response: Any) -> Any:
@@ -124,6 +137,7 @@ class UserInputNode(ComponentNode):
 
     def _publish(self) -> None:
         self._command.publish(user_command_to_message(self._input.command))
+        self.keepsake.keep(asdict(self._input.command))
 
     def _now(self) -> int:
         """Return the time [ns]: a wish carries no stamp of its own."""

@@ -17,8 +17,9 @@ from tulip_ros import topics, transport
 from tulip_ros.aggregation import Report
 from tulip_ros.errors import BadInputError
 from tulip_ros.finding import Level
-from tulip_ros.launch import DEATHS, Launcher
+from tulip_ros.launch import Launcher
 from tulip_ros.monitor import Monitor
+from tulip_ros.node_process import DEATHS
 from tulip_ros.nodes import NodeEntry
 from tulip_ros.plan import Start, make_plan
 from tulip_ros.run import ComponentNode, session
@@ -147,12 +148,13 @@ def test_refused_input_ends_the_launch_with_the_nodes_own_words(launch):
 
 
 def test_node_that_dies_again_and_again_is_given_up(launch, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("tulip_ros.launch.LONGEST_PAUSE", 0.01)
+    monkeypatch.setattr("tulip_ros.node_process.LONGEST_PAUSE", 0.01)
     with launch(a=CRASHING) as launcher:
         lines: list[str] = []
         wait_for(lambda: lines.extend(launcher.poll()) or launcher.states()[0].state == "given up")
         assert launcher.states()[0].restarts == DEATHS - 1
-        assert "broken motor" in lines[-1]
+        assert launcher.given_up == ("a",)
+        assert any("broken motor" in line for line in lines)
 
 
 def test_log_folder_that_cannot_be_made_is_refused(tmp_path: Path):
