@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+
 import _environment
 
 if __name__ == "__main__":
-    _environment.prepare()
+    _environment.prepare(("mujoco",) if "mujoco" in sys.argv else ())
 
-import sys
 from typing import Annotated, Any
 
 import typer

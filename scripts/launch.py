@@ -7,7 +7,7 @@ import sys
 import _environment
 
 if __name__ == "__main__":
-    _environment.prepare([name for name in ("view", "bridge") if f"--{name}" in sys.argv])
+    _environment.prepare([name for name in ("view", "bridge", "mujoco") if {name, f"--{name}"} & set(sys.argv)])
 
 import signal
 from pathlib import Path
@@ -59,6 +59,8 @@ def main(
         names = list(nodes or ROBOT) + (["recorder"] if record else []) + (["bridge"] if bridge else [])
         if "bridge" in names:
             require("foxglove", "bridge")
+        if driver == "mujoco":
+            require("mujoco", "mujoco")
         values = {"recorder": {"path": str(record.absolute())}} if record else {}
         if log is not None:
             if driver != "log":

@@ -78,6 +78,7 @@ def driver_of(body: str, *parameters: tuple[str, str]) -> NodeEntry:
 
 DRIVERS: dict[str, NodeEntry] = {
     "sim": NodeEntry(DRIVER, "tulip_sim.driver_node", playing=False),
+    "mujoco": NodeEntry(DRIVER, "tulip_sim.driver_node", playing=False, parameters=(("world.engine", "mujoco"),)),
     "match": NodeEntry(DRIVER, "tulip_sim.match_driver_node", playing=False),
     "log": NodeEntry(DRIVER, "tulip_sim.log_driver_node", playing=False),
     "echo": driver_of("tulip_driver.echo:EchoBody"),

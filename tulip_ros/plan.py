@@ -19,7 +19,7 @@ from tulip_ros.nodes import DRIVERS, NODES, ROBOT, NodeEntry, find_driver, find_
 Values = Mapping[str, Any]
 EVERY_NODE = "/**"
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*")
-SIMULATED = frozenset({"sim", "match", "log", "wire"})
+SIMULATED = frozenset({"sim", "mujoco", "match", "log", "wire"})
 """Drivers that publish /clock, which the other nodes follow then."""
 
 

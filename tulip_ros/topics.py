@@ -54,12 +54,17 @@ class Quality:
     depth: int
     latched: bool = False
 
-    def profile(self) -> QoSProfile:
-        """Return the profile for rclpy: always reliable, keep last."""
+    @property
+    def on_looking(self) -> ReliabilityPolicy:
+        """For who only looks: no publisher repeats a message for it. Latched ones reach reliable listeners alone."""
+        return ReliabilityPolicy.RELIABLE if self.latched else ReliabilityPolicy.BEST_EFFORT
+
+    def profile(self, reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE) -> QoSProfile:
+        """Return the profile for rclpy: keep last, and reliable unless asked otherwise."""
         return QoSProfile(
             history=HistoryPolicy.KEEP_LAST,
             depth=self.depth,
-            reliability=ReliabilityPolicy.RELIABLE,
+            reliability=reliability,
             durability=DurabilityPolicy.TRANSIENT_LOCAL if self.latched else DurabilityPolicy.VOLATILE,
         )
 
@@ -112,7 +117,12 @@ class Topic:
         return node.create_publisher(self.message, self.name, self.quality.profile())
 
     def subscribe_from(
-        self, node: Node, callback: Callable[[Any], None], raw: bool = False, depth: int | None = None
+        self,
+        node: Node,
+        callback: Callable[[Any], None],
+        raw: bool = False,
+        depth: int | None = None,
+        only_looks: bool = False,
     ) -> Subscription:
         """Create a subscription to this topic in a node.
 
@@ -121,9 +131,11 @@ class Topic:
             callback: Is given each message.
             raw: Give the callback the serialized message (bytes) instead.
             depth: How many messages wait for this listener; as many as for any other by default.
+            only_looks: The listener rather misses a message than has its sender repeat it.
         """
         quality = self.quality if depth is None else replace(self.quality, depth=depth)
-        return node.create_subscription(self.message, self.name, callback, quality.profile(), raw=raw)
+        profile = quality.profile(quality.on_looking) if only_looks else quality.profile()
+        return node.create_subscription(self.message, self.name, callback, profile, raw=raw)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from tulip_description.robot_io import JointCommand, Sensors
 from tulip_driver.contract import Body, BodyError
 from tulip_driver.parts import by_parts
 from tulip_sim.harness import Harness
-from tulip_sim.parameters import ENGINES, WorldParameters
+from tulip_sim.parameters import WorldParameters
 from tulip_sim.scenario import SCENARIOS, make_scenario
 from tulip_sim.timing import TICK
 from tulip_sim.world import World
@@ -24,7 +24,7 @@ class SimulatedBody(Body):
         scenario: What stands where at the start.
         seed: Of the scenario and of all noise.
         harness: Whether it hangs from its trunk, feet off the ground, as a real one does when it is first switched on.
-        engine: Of physics.
+        engine: Of its physics, one of `ENGINES`.
 
     Raises:
         ValueError: for an unknown scenario or engine, or a seed that is none.
@@ -34,7 +34,12 @@ class SimulatedBody(Body):
     simulated = True
 
     def __init__(
-        self, robot: Robot, scenario: str = "open", seed: int = 0, harness: bool = False, engine: str = ENGINES[0]
+        self,
+        robot: Robot,
+        scenario: str = "open",
+        seed: int = 0,
+        harness: bool = False,
+        engine: str = WorldParameters.engine,
     ) -> None:
         if scenario not in SCENARIOS:
             raise ValueError(f"scenario is {scenario!r}; expected one of {', '.join(SCENARIOS)}")

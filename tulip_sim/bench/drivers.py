@@ -196,8 +196,8 @@ def running(driver: str, report: int) -> Iterator[tuple[Commander, Until]]:
     """
     port = free_port()
     simulated = {"camera": False, "referee": False, "mode": "free", "wait_for": ["user_input"]}
-    nodes, name = ["user_input"], "sim"
-    values: dict[str, dict[str, Any]] = {"driver": {**simulated, "world": {"engine": _engine(driver)}}}
+    nodes, name = ["user_input"], driver
+    values: dict[str, dict[str, Any]] = {"driver": dict(simulated)}
     if driver in LISTENED:
         name = f"{drivers_bodies.__name__}:{LISTENED[driver].__name__}"
         values = {"driver": {"options": [f"report={report}"]}}
@@ -223,10 +223,6 @@ def running(driver: str, report: int) -> Iterator[tuple[Commander, Until]]:
         yield commander, until
 
 
-def _engine(driver: str) -> str:
-    return "mujoco" if driver == "mujoco" else "pybullet"
-
-
 def _check(driver: str) -> Row:
     """Return the verdict of the contract's test kit."""
     robot, port = load_robot(), free_port()
@@ -238,7 +234,7 @@ def _check(driver: str) -> Row:
         elif driver == "wire":
             body = WireBody(robot, port=port, patience=PATIENCE)
         else:
-            body = SimulatedBody(robot, harness=True, engine=_engine(driver))
+            body = SimulatedBody(robot, harness=True, engine="mujoco" if driver == "mujoco" else "pybullet")
         rows = list(check_driver(body, robot, lambda: True))
     return {
         "checks": len(rows),

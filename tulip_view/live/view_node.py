@@ -11,6 +11,7 @@ from rclpy.node import Node
 from tulip_description.field import load_field
 from tulip_description.robot import load_robot
 from tulip_ros.asking import Asker
+from tulip_ros.priority import give_way
 from tulip_ros.run import ComponentNode, run
 from tulip_view.live.beside import PORT
 from tulip_view.live.live_feed import PICTURES, LiveFeed
@@ -102,4 +103,5 @@ class ViewNode(ComponentNode):
 
 
 if __name__ == "__main__":
+    give_way()
     run(ViewNode, ViewNode.advance)

@@ -62,7 +62,12 @@ class RobotLink(Node):
         # What comes fifty times a second waits in the middleware for the next look: to wake up for each is costly.
         self._steady = {
             topic.name: RawTopic(
-                self, self.resolve_topic_name(topic.within(robot).name), topic.type_name, topic.quality, waiting=1
+                self,
+                self.resolve_topic_name(topic.within(robot).name),
+                topic.type_name,
+                topic.quality,
+                topic.quality.on_looking,
+                waiting=1,
             )
             for topic in STEADY
         }
