@@ -39,6 +39,7 @@ NOT_IN_LOCKSTEP = {
     topics.START_POSE,  # in matches alone
     topics.REPORT,
     topics.USER_WISH,  # nobody is there to wish
+    topics.EMERGENCY_STOP,  # nor to stop it
     topics.DIAGNOSTICS_AGG,
     topics.IDENTIFICATION,  # in the experiment alone
     topics.MARKERS,
