@@ -12,7 +12,7 @@ import importlib.util
 import select
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
@@ -52,7 +52,7 @@ PATIENCE = 60.0  # [s] for what takes a second
 STEADY = 25  # readings at rest before a try
 CHECK = "check"
 STALLS = "stalls"
-LIVES, STALL_TIMES, SEEDS = (40, 100), (60, 92, 140), 6  # [ms] and [ms]; walks of each
+LIVES, STALL_TIMES, WALKS = (40, 100), (60, 92, 140), 6  # [ms] and [ms]; walks of each
 LISTENED = {"echo": drivers_bodies.ToldEcho, "wire": drivers_bodies.ToldWire}
 """Drivers whose bodies tell when they are told to have no stiffness."""
 SOON = 1.0  # [s] in which that must have come
@@ -196,8 +196,8 @@ def running(driver: str, report: int) -> Iterator[tuple[Commander, Until]]:
     """
     port = free_port()
     simulated = {"camera": False, "referee": False, "mode": "free", "wait_for": ["user_input"]}
-    nodes, name = ["user_input"], "sim"
-    values: dict[str, dict[str, Any]] = {"driver": {**simulated, "world": {"engine": _engine(driver)}}}
+    nodes, name = ["user_input"], driver
+    values: dict[str, dict[str, Any]] = {"driver": dict(simulated)}
     if driver in LISTENED:
         name = f"{drivers_bodies.__name__}:{LISTENED[driver].__name__}"
         values = {"driver": {"options": [f"report={report}"]}}
@@ -223,10 +223,6 @@ def running(driver: str, report: int) -> Iterator[tuple[Commander, Until]]:
         yield commander, until
 
 
-def _engine(driver: str) -> str:
-    return "mujoco" if driver == "mujoco" else "pybullet"
-
-
 def _check(driver: str) -> Row:
     """Return the verdict of the contract's test kit."""
     robot, port = load_robot(), free_port()
@@ -238,10 +234,10 @@ def _check(driver: str) -> Row:
         elif driver == "wire":
             body = WireBody(robot, port=port, patience=PATIENCE)
         else:
-            body = SimulatedBody(robot, harness=True, engine=_engine(driver))
+            body = SimulatedBody(robot, harness=True, engine="mujoco" if driver == "mujoco" else "pybullet")
         rows = list(check_driver(body, robot, lambda: True))
     return {
-        "checks": len(rows),
+        "checks": sum(each.judgement is not Judgement.SKIPPED for each in rows),
         "passed": sum(each.judgement is Judgement.PASS for each in rows),
         "failed": [f"{each.what}: {each.measured}" for each in rows if each.judgement is Judgement.FAIL],
         "verdict": verdict(rows)[1],
@@ -295,14 +291,32 @@ def _told(times: list[float]) -> str:
     return f"{np.median(times):.1f} ms, {max(times):.1f} at most" if times else "-"
 
 
+def choose(options: Mapping[str, str]) -> list[tuple[str, int | str]]:
+    """Return what is tried.
+
+    Args:
+        options: rounds of tries; drivers, with commas between; walks of each kind with stalls.
+
+    Raises:
+        ValueError: for other options, or values that cannot be used.
+    """
+    known = {"rounds": str(ROUNDS), "drivers": ",".join(DRIVERS), "walks": str(WALKS)}
+    if not options.keys() <= known.keys():
+        raise ValueError(f"options are {', '.join(options)}; expected some of {', '.join(known)}")
+    chosen = known | dict(options)
+    drivers = chosen["drivers"].split(",")
+    if not set(drivers) <= set(DRIVERS):
+        raise ValueError(f"drivers are {chosen['drivers']}; expected some of {','.join(DRIVERS)}")
+    trials = [(driver, number) for number in (CHECK, *range(1, int(chosen["rounds"]) + 1)) for driver in drivers]
+    return [*trials, *((STALLS, seed) for seed in range(int(chosen["walks"])))]
+
+
 BENCH = Bench(
     "drivers",
     "Time-out and emergency stop of the drivers",
-    [
-        *((driver, number) for number in (CHECK, *range(1, ROUNDS + 1)) for driver in DRIVERS),
-        *((STALLS, seed) for seed in range(SEEDS)),
-    ],
+    choose({}),
     measure,
     summarize,
     workers=1,
+    choose=choose,
 )
