@@ -26,10 +26,9 @@ from tulip_sim.batch.journal import Journal
 from tulip_sim.batch.parameter_sets import DEFAULT, read_sets
 from tulip_sim.batch.results import check_ending, summarize, write_results
 from tulip_sim.batch.workers import play_here, play_on_ray
-from tulip_sim.perception import PerceptionParameters
+from tulip_sim.perception import EYES
 from tulip_sim.scenario import SCENARIOS
 
-EYES = {"camera": None, "degraded": PerceptionParameters(), "ideal": PerceptionParameters.ideal()}
 TRIAL = "trial"
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 JOURNAL = ".journal"  # behind the name of the results file

@@ -11,12 +11,14 @@ import signal
 import sys
 from collections.abc import Sequence
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Annotated, NoReturn
 
 import numpy as np
 import typer
 from _progress import progress
+from _rehearsal import REFUSED, may_go
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -43,7 +45,10 @@ from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_new_file
 from tulip_ros.log_file import files_of
 from tulip_sim.identify_graph import run_graph
 from tulip_sim.identify_lockstep import run_lockstep
+from tulip_sim.rehearsal.experiment import play_experiment
+from tulip_sim.rehearsal.present import standing
 from tulip_view import identification as tables
+from tulip_view.present_sensors import running
 from tulip_view.recorded_sensors import motion_log_of
 from tulip_view.static_measurements import measurements_of
 
@@ -66,17 +71,26 @@ def run(
     ] = None,
     seed: Annotated[int, typer.Option(help="Of all noise in the simulation.", min=0)] = 1,
     record: Annotated[Path | None, typer.Option(help="New folder for the recording.")] = None,
+    rehearse: Annotated[
+        bool, typer.Option("--rehearse", help="First do it in the simulator; do not begin if it fails.")
+    ] = False,
+    anyway: Annotated[bool, typer.Option("--anyway", help="Begin all the same if it fails.")] = False,
 ) -> None:
     """Drive the robot through postures on one foot, then on the other, and record it.
 
     The robot stands free on level ground. Ctrl-C makes it put its foot down and stand (graph). The exit code is 0 if
-    every posture was held, 1 if some were not, 2 for bad input, 130 after Ctrl-C.
+    every posture was held, 1 if some were not or the rehearsal failed, 2 for bad input, 130 after Ctrl-C.
     """
     console = Console()
     try:
         if mode not in MODES:
             raise BadInputError(f"--mode is {mode!r}; expected one of {', '.join(MODES)}.")
         settings = ExperimentSettings("" if body is None else str(body.absolute()), PlanParameters(postures))
+        if rehearse:
+            runs = mode == "graph" and driver == "none"
+            present = running(load_robot()) if runs else standing(load_robot())
+            if not may_go(partial(play_experiment, settings, present), f"{2 * postures} postures", anyway):
+                raise typer.Exit(REFUSED)
         folder = record or Path("recordings") / f"{datetime.now():%Y%m%d_%H%M%S}_identify"
         with progress() as bar:
             task = bar.add_task("planning", total=2 * postures)

@@ -19,6 +19,7 @@ from rich.console import Console
 from rich.live import Live
 
 from tulip_ros import network, plan
+from tulip_ros.emergency_stop import StopLink
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, require, unknown
 from tulip_ros.launch import Launcher
 from tulip_ros.log_file import Log
@@ -29,6 +30,10 @@ from tulip_ros.transport import NAMES as TRANSPORTS
 from tulip_view.live.beside import PORT, address, page_beside
 
 LOOK = 0.2  # [s] between two looks at the processes
+HEED = 0.05  # [s] in which Ctrl-C is noticed; 0.02 would cost 0.5 % of a core more
+TOLD = 0.2  # [s] at most until everybody knows of an emergency stop
+MOVING = frozenset({DRIVER, "motion", "identify"})
+"""Nodes without which the joints are not commanded any more: before they are ended, the robot goes limp."""
 
 
 def main(
@@ -51,6 +56,10 @@ def main(
     logs: Annotated[Path | None, typer.Option(help="Folder for one log file a node.")] = None,
     view: Annotated[bool, typer.Option("--view", help="Open a page to watch and steer in a browser.")] = False,
     view_port: Annotated[int, typer.Option(help="TCP port of that page.", min=1, max=65535)] = PORT,
+    rehearse: Annotated[
+        bool, typer.Option("--rehearse", help="First play the walk in the simulator; start nothing if it fails.")
+    ] = False,
+    anyway: Annotated[bool, typer.Option("--anyway", help="Start all the same if it fails.")] = False,
     peers: Network = "",
 ) -> None:
     """Start nodes and keep them running."""
@@ -71,6 +80,11 @@ def main(
             with Log(log):  # says what is wrong with it before anything starts
                 values["driver"] = {"file": str(log.absolute())}
         starts = plan.make_plan(names, None if driver == "none" else driver, namespace, parameters or (), values)
+        if rehearse:
+            from _rehearsal import REFUSED, may_launch  # brings the simulator, which others need not wait for
+
+            if not may_launch(starts, anyway):
+                raise typer.Exit(REFUSED)
         network.join(peers, transport)
         if view:
             starts += page_beside(view_port, plan.check_namespace(namespace))
@@ -82,7 +96,10 @@ def main(
 
 
 def keep_running(launcher: Launcher, namespace: str) -> None:
-    """Run the nodes until Ctrl-C or SIGTERM; on a terminal with a table, else with a line for each event."""
+    """Run the nodes until Ctrl-C or SIGTERM; on a terminal with a table, else with a line for each event.
+
+    Where they move the robot, the end of them is an emergency stop; and whatever happens, the driver ends first.
+    """
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     console = Console(stderr=True)
     console.print(f"logs: {launcher.log_folder}", highlight=False, soft_wrap=True)
@@ -98,12 +115,20 @@ def keep_running(launcher: Launcher, namespace: str) -> None:
             names = [state.name for state in launcher.states()]
             # Who starts tools beside a running robot leaves the sum to the one who started the robot.
             monitor = Monitor(node, names, publishes=bool({DRIVER, *ROBOT} & set(names)) and AGGREGATOR not in names)
-            while True:
-                spin(LOOK)
-                for line in launcher.poll():
-                    console.print(line, highlight=False, markup=False, soft_wrap=True)
-                if console.is_terminal:
-                    live.update(monitor.table(launcher.states()), refresh=True)
+            stop = StopLink(node, "launcher") if MOVING & set(names) else None
+            try:
+                while True:
+                    for _ in range(round(LOOK / HEED)):
+                        spin(HEED)
+                    for line in launcher.poll():
+                        console.print(line, highlight=False, markup=False, soft_wrap=True)
+                    if console.is_terminal:
+                        live.update(monitor.table(launcher.states()), refresh=True)
+            except KeyboardInterrupt:
+                if stop is not None:
+                    stop.engage("its nodes are ended")
+                    stop.wait_until_told(TOLD)
+                raise
     except KeyboardInterrupt:
         console.print("all nodes ended", highlight=False)
 

@@ -39,7 +39,7 @@ from tulip_sim.match_settings import MatchSettings
 from tulip_sim.match_summary import MatchSummary
 from tulip_sim.match_two_graph import match_plan, play_match_graph
 from tulip_sim.parameters import ENGINES, WorldParameters
-from tulip_sim.perception import PerceptionParameters
+from tulip_sim.perception import EYES, PerceptionParameters
 from tulip_sim.play_lockstep_match import play_lockstep_match
 from tulip_sim.robot_stack import RobotSettings
 from tulip_sim.scenario import SCENARIOS
@@ -50,7 +50,6 @@ from tulip_view.live.beside import PORT, address, page_beside
 
 MODES = ("graph", "lockstep")
 DRIVERS = ("sim", "wire")
-EYES = {"camera": None, "degraded": PerceptionParameters(), "ideal": PerceptionParameters.ideal()}
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 LONGEST = 155.0  # [s] preparation and 150 s of play
 

@@ -35,7 +35,7 @@ def main() -> int:
             failed.append(" ".join(check))
     if not arguments:
         print("== pytest", flush=True)
-        # Tests that run nodes follow each other in one process (tests/conftest.py), all others meanwhile in another one.
+        # Tests that run nodes follow each other in one process (tests/conftest.py), all others meanwhile in another.
         arguments = ["-n", "2", "--dist", "loadgroup"]
     if failed:
         print(f"failed before the tests: {', '.join(failed)}", flush=True)

@@ -123,6 +123,11 @@ class Foot:
     y: tuple[float, float]
     cells: tuple[tuple[float, float], ...]
 
+    @property
+    def corners(self) -> Array:
+        """(4, 3) corners in the sole frame [m]."""
+        return np.array([(x, y, 0.0) for x in self.x for y in self.y])
+
 
 @dataclass(frozen=True)
 class Robot:

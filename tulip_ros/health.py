@@ -15,7 +15,8 @@ from rclpy.node import Node
 
 from tulip_ros import topics
 from tulip_ros.finding import Finding, Level, say, worst
-from tulip_ros.launch import RESTARTS_VARIABLE
+from tulip_ros.heartbeat import beat
+from tulip_ros.node_process import RESTARTS_VARIABLE
 from tulip_ros.time import to_message
 from tulip_ros.topics import Topic
 from tulip_ros.watches import HOLD, InputWatch, TimeWatch
@@ -97,8 +98,9 @@ class Health:
     def _look(self) -> None:
         now = monotonic()
         self._looks += 1
-        due = self._looks % LOOKS == 0
+        due = self._looks % LOOKS == 1  # the first one, too: it tells that the node is there
         if due:
+            beat()
             asked = [check() for check in self._checks] + [watch.tally() for watch in self._inputs.values()]
             self._found = [finding for finding in asked if finding is not None]
         time = self._node.get_clock().now().nanoseconds

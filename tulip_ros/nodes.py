@@ -55,6 +55,7 @@ NODES: dict[str, NodeEntry] = {
         NodeEntry("game_input", "tulip_strategy.game_input_node"),
         NodeEntry("user_input", "tulip_strategy.user_input_node"),
         NodeEntry("emulator", "tulip_sim.emulator_node", playing=False),
+        NodeEntry("disturber", "tulip_sim.disturber_node", playing=False),
         NodeEntry("perception", "tulip_sim.perception_node", playing=False),
         NodeEntry("identify", "tulip_motion.identification.identify_node", playing=False),
         NodeEntry(AGGREGATOR, "tulip_ros.aggregator_node", playing=False),

@@ -105,6 +105,14 @@ class PerceptionParameters:
         )
 
 
+EYES: dict[str, PerceptionParameters | None] = {
+    "camera": None,
+    "degraded": PerceptionParameters(),
+    "ideal": PerceptionParameters.ideal(),
+}
+"""How a robot can see in lockstep, by the names that users choose from: with pictures, or as good as told."""
+
+
 @dataclass(frozen=True)
 class Glimpse:
     """What the camera saw of one thing, in camera_optical_frame.

@@ -13,15 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from tulip_description import frames
 from tulip_description.model import floating_model
 from tulip_description.planar import Pose2D
+from tulip_description.quaternion import Quaternion, quaternion_product
 from tulip_description.robot import Robot
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_sim.driver import MILLISECOND, JointDriver
 from tulip_sim.engine import RobotBody
+from tulip_sim.faults import SensorFaults
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.sensors import BodyState, SensorModel, cell_forces
 from tulip_sim.touches import TouchCounter
 
 Array = NDArray[np.float64]
+UNEVEN = 0.02  # [m] 5 degrees of a sole's length: a robot that stands gives way by less, one foot is lifted by more
 
 
 class SimulatedRobot:
@@ -42,6 +45,7 @@ class SimulatedRobot:
         start: Array,
         pose: Pose2D,
         rng: tuple[np.random.Generator, np.random.Generator],
+        tilt: Quaternion | None = None,
     ) -> None:
         """Put it on the field, at rest, its soles on the ground; it holds its posture until the first commands come.
 
@@ -52,12 +56,15 @@ class SimulatedRobot:
             start: (n,) posture at the start [rad], feet flat.
             pose: Of base_link in map, seen from above.
             rng: Where its own friction comes from, and the errors of its sensors.
+            tilt: Of the trunk as measured in that posture, without a heading; None: upright. Then the feet need be no
+                flatter than a robot's are that stands: it settles on them.
 
         Raises:
             ValueError: if start has a wrong shape or the feet of that posture are not level.
         """
         self.robot, self.body, self._parameters = robot, body, parameters
-        self._start, self._start_height = start, _base_height(robot, start)
+        self._start, self._tilt = start, tilt
+        self._start_height = _base_height(robot, start) if tilt is None else _tilted_height(robot, start, tilt)
         p = parameters
         physics_rng, sensor_rng = rng
         n = len(robot.joint_names)
@@ -68,6 +75,8 @@ class SimulatedRobot:
         self.joint_positions, self.joint_velocities = start.copy(), np.zeros(n)
         self._push_force, self._push_end = np.zeros(3), 0
         self._touches = {"left": TouchCounter(), "right": TouchCounter(), "body": TouchCounter()}
+        self.faults = SensorFaults(p.faults, robot.joint_names)
+        """What is broken about its sensors."""
         self._sensors = SensorModel(robot, p.sensors, sensor_rng, self._body_state(0))
         self._delay = int(physics_rng.integers(p.sensor_delay[0], p.sensor_delay[1] + 1))  # [ms]
         under_way = self._delay // p.sensors.period + 1
@@ -87,13 +96,21 @@ class SimulatedRobot:
         """Give a command to the driver at a time [ns]; return "" or the reason why it did not take it."""
         return self._driver.accept(command, now)
 
+    def limp(self, reason: str) -> None:
+        """Take all torque from the joints, and refuse commands until `release`."""
+        self._driver.limp(reason)
+
+    def release(self) -> None:
+        """Take commands again; every joint stays limp until its next one."""
+        self._driver.release()
+
     def silent_joints(self, now: int) -> tuple[str, ...]:
         """Return the joints that are only damped or limp at a time [ns], since nobody commands them any more."""
         return self._driver.silent_joints(now)
 
     def drive(self, now: int) -> None:
         """Put the torques of the next millisecond on the joints, and a push on the trunk while there is one."""
-        effort = self._driver.torques(now, self.joint_positions, self.joint_velocities)
+        effort = self._driver.torques(now, self.faults.felt(self.joint_positions, now), self.joint_velocities)
         self._effort_sum += effort
         self._effort_count += 1
         self.body.drive(effort - self._friction_torque())
@@ -107,7 +124,7 @@ class SimulatedRobot:
     def measure(self, now: int) -> None:
         """Read the sensors if a reading is due at this millisecond."""
         if (now // MILLISECOND + self._delay) % self._parameters.sensors.period == 0:
-            self._readings.append(self._sensors.measure(self._body_state(now)))
+            self._readings.append(self.faults.reading(self._sensors.measure(self._body_state(now))))
             self._effort_sum[:], self._effort_count = 0.0, 0
 
     def sensors(self, now: int) -> Sensors:
@@ -157,8 +174,10 @@ class SimulatedRobot:
         self.joint_positions, self.joint_velocities = self._start.copy(), np.zeros(len(self._start))
 
     def _place(self, pose: Pose2D) -> None:
-        turn = np.array([0.0, 0.0, math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)])
-        self.body.place(np.array([pose.x, pose.y, self._start_height]), turn, self._start)
+        turn = (0.0, 0.0, math.sin(pose.yaw / 2), math.cos(pose.yaw / 2))
+        if self._tilt is not None:
+            turn = quaternion_product(turn, self._tilt)
+        self.body.place(np.array([pose.x, pose.y, self._start_height]), np.array(turn), self._start)
 
     def _friction_torque(self) -> Array:
         torque: Array = self.dry_friction * np.tanh(self.joint_velocities / self._parameters.joint_friction_speed)
@@ -213,12 +232,7 @@ def as_drawn(
 
 def _base_height(robot: Robot, joints: Array) -> float:
     """Return the height of base_link with an upright trunk and the soles on the ground."""
-    if joints.shape != (len(robot.joint_names),):
-        raise ValueError(f"joint_positions has shape {joints.shape}; expected ({len(robot.joint_names)},)")
-    model = floating_model(robot)
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, np.concatenate([[0, 0, 0, 0, 0, 0, 1], joints]))
-    soles = [data.oMf[model.getFrameId(name)] for name in (frames.LEFT_SOLE, frames.RIGHT_SOLE)]
+    soles = _soles(robot, joints, (0.0, 0.0, 0.0, 1.0))
     heights = [float(sole.translation[2]) for sole in soles]
     if abs(heights[0] - heights[1]) > 1e-3 or any(sole.rotation[2, 2] < math.cos(0.01) for sole in soles):
         raise ValueError(
@@ -227,3 +241,26 @@ def _base_height(robot: Robot, joints: Array) -> float:
             " expected level soles of equal height with an upright trunk"
         )
     return -min(heights)
+
+
+def _tilted_height(robot: Robot, joints: Array, tilt: Quaternion) -> float:
+    """Return the height of base_link with a trunk that is tilted and the lowest corner of the soles on the ground."""
+    soles = _soles(robot, joints, tilt)
+    placed = zip(robot.feet, soles, strict=True)
+    heights = np.array([(foot.corners @ sole.rotation.T + sole.translation)[:, 2] for foot, sole in placed])
+    if np.ptp(heights) > UNEVEN:
+        raise ValueError(
+            f"the corners of the soles are up to {1e3 * np.ptp(heights):.0f} mm higher than the lowest one; expected"
+            f" {1e3 * UNEVEN:.0f} mm at most, as of a robot that stands on both feet on level ground"
+        )
+    return -float(heights.min())
+
+
+def _soles(robot: Robot, joints: Array, orientation: Quaternion) -> list[pin.SE3]:
+    """Return the placements of both soles below a base_link at the origin."""
+    if joints.shape != (len(robot.joint_names),):
+        raise ValueError(f"joint_positions has shape {joints.shape}; expected ({len(robot.joint_names)},)")
+    model = floating_model(robot)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, np.concatenate([[0.0, 0.0, 0.0], orientation, joints]))
+    return [data.oMf[model.getFrameId(name)] for name in (frames.LEFT_SOLE, frames.RIGHT_SOLE)]

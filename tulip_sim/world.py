@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from tulip_description.field import Field, load_field
 from tulip_description.planar import Pose2D
 from tulip_description.posture import standing_posture
+from tulip_description.quaternion import Quaternion
 from tulip_description.robot import Robot, load_robot
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_sim.driver import MILLISECOND
@@ -38,12 +39,13 @@ class World:
         field: Geometry of the field; None for the project's own.
         robot: What the robots are like, as motion control may know; None for the playing robot.
         joint_positions: (n,) posture at the start [rad], feet flat; None for `standing_posture`.
+        tilt: Quaternion x, y, z, w of the robots' trunks in that posture, without a heading; None: upright.
         true_body: Whose masses, CoMs and inertias the robots really have, before the parameters' random changes; None
             for those of `robot`.
 
     Raises:
-        ValueError: if joint_positions has a wrong shape, the feet of that posture are not level, or true_body is of
-            another shape than robot.
+        ValueError: if joint_positions has a wrong shape, the feet of that posture are not on level ground, or true_body
+            is of another shape than robot.
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class World:
         robot: Robot | None = None,
         joint_positions: ArrayLike | None = None,
         true_body: Robot | None = None,
+        tilt: Quaternion | None = None,
     ) -> None:
         self.scenario = scenario
         self.parameters = parameters if parameters is not None else WorldParameters()
@@ -75,7 +78,7 @@ class World:
         self._keeper_pose = None if scenario.keeper is None else scenario.keeper.pose
         self._keeper_touches = TouchCounter()
         self.robots = tuple(
-            SimulatedRobot(self.robot, body, p, start, pose, rng)
+            SimulatedRobot(self.robot, body, p, start, pose, rng, tilt)
             for body, pose, rng in zip(self.physics.robots, poses, rngs, strict=True)
         )
         self.place_ball(*scenario.ball)

@@ -58,11 +58,31 @@ class UserInput:
         self._strategies = strategies
         request = UserRequest.PLAY if parameters.autostart else UserRequest.STOP
         self._command = UserCommand(stamp, request, parameters.strategy)
+        self._stopped = ""  # why an emergency stop holds
+
+    def recall(self, command: UserCommand) -> None:
+        """Go on with the wish that held when this program died."""
+        if command.strategy in self._strategies:
+            self._command = command
 
     @property
     def command(self) -> UserCommand:
         """The command that holds."""
         return self._command
+
+    def stop(self, stamp: int, reason: str) -> None:
+        """Want limp legs and nothing else until `release`, and limp legs after it until the next wish.
+
+        Args:
+            stamp: When [ns].
+            reason: In words, not empty.
+        """
+        self.ask(stamp, UserRequest.LIMP)
+        self._stopped = reason
+
+    def release(self) -> None:
+        """Take wishes again."""
+        self._stopped = ""
 
     def ask(
         self,
@@ -87,6 +107,8 @@ class UserInput:
         if request not in tuple(UserRequest):
             return f"request is {request}; expected 0 to {max(UserRequest).value}"
         wish = UserRequest(request)
+        if self._stopped and wish is not UserRequest.LIMP:
+            return f"{self._stopped}; release it first"
         refusal = ""
         if wish is UserRequest.PLAY and strategy and strategy not in self._strategies:
             refusal = f"strategy is {strategy!r}; expected one of: {', '.join(sorted(self._strategies))}"

@@ -19,12 +19,13 @@ from tulip_ros.topics import Topic
 SENSORS = (topics.JOINT_STATES, topics.IMU, topics.FOOT_FORCES)
 
 
-def sensors_of(path: Path, namespace: str = "") -> Iterator[Sensors]:
+def sensors_of(path: Path, namespace: str = "", within: tuple[float, float] | None = None) -> Iterator[Sensors]:
     """Return the readings of joints, IMU and foot cells of one robot, in the order of the recording.
 
     Args:
         path: Folder or file of the recording.
         namespace: Of the robot; "" for one that is alone.
+        within: From when to when [s] since the recording's begin, by its own clock; None: all of it.
 
     Raises:
         BadInputError: if the recording cannot be read, lacks one of the sensors, or is of a robot with other joints.
@@ -37,8 +38,10 @@ def sensors_of(path: Path, namespace: str = "") -> Iterator[Sensors]:
                 f"Recording {log.path} has no messages of {', '.join(missing)}; expected joints, IMU and foot cells of"
                 f" the robot {namespace or 'that is alone'}: record these topics, or choose the robot by its namespace."
             )
+        begin, _ = log.span
+        start, end = (None, None) if within is None else (begin + round(1e9 * each) for each in within)
         instants = SameStamp(*names)
-        for record in log.records(names):
+        for record in log.records(names, start, end):
             message = log.decode(record)
             complete = instants.add(record.topic.name, stamp_of(message), message)
             if complete is not None:

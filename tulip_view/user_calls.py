@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 from threading import RLock
 from typing import Any
 
@@ -13,8 +14,10 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import String
 
+from tulip_description.emergency_stop import StopWord
 from tulip_ros import topics
 from tulip_ros.asking import Asker, NotServedError
+from tulip_ros.emergency_stop import StopLink
 from tulip_ros.topics import Service
 from tulip_strategy.interface import UserRequest
 from tulip_strategy.user_input import Wish
@@ -34,6 +37,7 @@ class UserCalls:
         self,
         node: Node,
         asker: Asker,
+        face: str,
         robot: str,
         tell: Callable[[Outcome], None],
         is_watched: Callable[[], bool] = lambda: True,
@@ -43,6 +47,7 @@ class UserCalls:
         Args:
             node: Has them; an executor serves it.
             asker: That node's.
+            face: What people have before them, as in "menu".
             robot: Namespace of the robot; "" for one that is alone.
             tell: Is told each outcome, from the node's thread or the caller's.
             is_watched: Whether somebody is at this face; a walk test that began here ends soon after nobody is.
@@ -58,10 +63,17 @@ class UserCalls:
         topics.USER_COMMAND.within(robot).subscribe_from(node, self._on_command)
         node.create_timer(PRESENCE, self._give_sign, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-        def client(service: Service, namespace: str = robot) -> Client:
-            return node.create_client(service.type, f"/{namespace}/{service.name}".replace("//", "/"))
+        def full(name: str, namespace: str = robot) -> str:
+            return f"/{namespace}/{name}".replace("//", "/")
 
-        self._wishes, self._pushes = client(topics.SET_USER_COMMAND), client(topics.PUSH)
+        def client(service: Service, namespace: str = robot) -> Client:
+            return node.create_client(service.type, full(service.name, namespace))
+
+        stop = topics.EMERGENCY_STOP
+        self._stop = StopLink(node, face, topic=replace(stop, name=full(stop.name)), knows_time=False)
+        self._wishes, self._pushes, self._releases = map(
+            client, (topics.SET_USER_COMMAND, topics.PUSH, topics.RELEASE_STOP)
+        )
         # A recorder of the robot's own, or one outside that records all robots.
         self._recorders = {
             begin: [client(service, namespace) for namespace in dict.fromkeys((robot, ""))]
@@ -72,12 +84,32 @@ class UserCalls:
     @property
     def reaches_user_input(self) -> bool:
         """Whether node user_input is there."""
-        return bool(self._wishes.service_is_ready())
+        return bool(self._wishes.service_is_ready() and self._releases.service_is_ready())
 
     @property
     def reaches_experiment(self) -> bool:
         """Whether node identify is there."""
         return bool(self._experiments[False].service_is_ready())
+
+    @property
+    def stop(self) -> StopWord:
+        """What counts of the emergency stop."""
+        return self._stop.word
+
+    def emergency_stop(self, reason: str) -> None:
+        """Stop the robot; every node hears it by itself, so that none is needed for the others.
+
+        Args:
+            reason: In words, as in "key l".
+        """
+        with self._order:
+            self._next_walk = None
+            self._stop.engage(reason)
+        self._tell(Outcome("emergency stop", "sent"))
+
+    def release(self) -> None:
+        """Release the emergency stop; the robot stays limp until the next wish."""
+        self._ask(self._releases, self._releases.srv_type.Request(), "release", NO_USER_INPUT)
 
     def wish(self, wish: Wish) -> None:
         """Tell the robot what the user wants.

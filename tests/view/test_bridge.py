@@ -214,7 +214,12 @@ def test_published_wish_holds_then(graph: Graph):
 @pytest.mark.parametrize(
     ("topic", "type_name", "encoding", "words"),
     [
-        ("/legs/joint_command", "tulip_msgs/msg/JointCommand", "cdr", "only user_wish and initialpose are"),
+        (
+            "/legs/joint_command",
+            "tulip_msgs/msg/JointCommand",
+            "cdr",
+            "only user_wish and emergency_stop and initialpose are",
+        ),
         ("/user_command", "tulip_msgs/msg/UserCommand", "cdr", "is not for viewers to publish"),
         ("/user_wish", "std_msgs/msg/String", "cdr", "expected tulip_msgs/msg/UserCommand"),
         ("/user_wish", "tulip_msgs/msg/UserCommand", "json", "expected cdr"),

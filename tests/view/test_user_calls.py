@@ -51,7 +51,7 @@ def slow() -> Iterator[Slow]:
 
         server.create_service(topics.SET_USER_COMMAND.type, topics.SET_USER_COMMAND.name, on_wish)
         executor.add_node(server)
-        calls = UserCalls(node, Asker(node), "", told.append)
+        calls = UserCalls(node, Asker(node), "face", "", told.append)
         while not calls.reaches_user_input:
             spin(0.05)
         yield Slow(calls, asked, told, spin, executor)

@@ -127,7 +127,7 @@ class PostureSolver:
         self._torques = p.torque_share * robot.effort_limits
         self._collision = SelfCollision(robot)
         sole = robot.feet[1 if side == "left" else 0]
-        self._corners = np.array([(x, y, 0.0) for x in sole.x for y in sole.y]).T
+        self._corners = sole.corners.T
         self.aim = aim_point(robot, side)
 
     def coordinates_of(self, joint_positions: Array) -> Array:

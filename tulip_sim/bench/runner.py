@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +27,7 @@ class Bench:
         draw: Writes docs/results/NAME.png from the rows.
         workers: Processes at most; 1 for a bench that measures time, whose trials must not disturb each other.
         prepare: Gets what the trials need besides, and tells of it; RuntimeError if it cannot be had.
+        choose: Makes other trials, from options by name; ValueError for those that it does not know.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Bench:
     draw: Callable[[Sequence[Row], Path], None] | None = None
     workers: int | None = None
     prepare: Callable[[Callable[[str], None]], None] | None = None
+    choose: Callable[[Mapping[str, str]], Sequence[tuple[Any, ...]]] | None = None
 
 
 def run(bench: Bench, workers: int | None = None, done: Callable[[Row], None] | None = None) -> list[Row]:

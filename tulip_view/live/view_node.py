@@ -95,7 +95,7 @@ class ViewNode(ComponentNode):
         with self._calls_lock:
             if robot not in self._calls:
                 self._calls[robot] = UserCalls(
-                    self, self._asker, robot, self._steer.tell, lambda: bool(self._server.get_clients())
+                    self, self._asker, "page", robot, self._steer.tell, lambda: bool(self._server.get_clients())
                 )
             return self._calls[robot]
 
