@@ -207,7 +207,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
             axes[2].plot(60.0 * times, values - values[0], label=node, **style)
     axes[2].set(xlabel="simulated time [min]", ylabel="memory since the first sample [MB]", title="graph")
     if nodes:
-        axes[2].legend(fontsize="x-small", ncols=4, loc="center right")
+        axes[2].legend(fontsize="x-small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     figure.savefig(path, dpi=120)
 
 

@@ -23,11 +23,12 @@ from tulip_sim.bench.processor_time import processor_time
 from tulip_sim.bench.soaking import samples
 from tulip_sim.bench.soaking.resources import resources, shared_memory_files
 from tulip_sim.bench.soaking.samples import SIMULATED, Sample
-from tulip_sim.match_graph import LOOK, SILENCE
+from tulip_sim.match_graph import LOOK
 from tulip_sim.match_rules import NAMESPACES, MatchRules
 from tulip_sim.match_two_graph import MatchWatcher, match_plan
 
 MODE = "graph"
+SILENCE = 300.0  # [s] of wall-clock time without news from the simulator: other programs may have the machine a while
 PERIOD = 20.0  # [s] of simulated time between two samples
 ENDLESS = MatchRules(trials=1000, extra_pairs=0)
 NODES, WHOLE, EVENTS = "nodes", "whole", "events"
