@@ -87,7 +87,8 @@ class FaultWatcher(TrialWatcher):
     @property
     def walks(self) -> bool:
         """Whether the robot is under way."""
-        return self.motion is not None and self.motion.mode == MotionState.WALK and self.stamp > 3 * SECOND
+        now = self.samples[-1] if self.samples else None
+        return now is not None and now.mode == MotionState.WALK and not now.fallen and now.stamp > 3 * SECOND
 
     @property
     def over(self) -> bool:
@@ -258,8 +259,7 @@ class FaultTrial:
         watcher = self.watcher
         if name == "driver":  # another world, whose time began anew
             return 0 < watcher.stamp < killed and watcher.walks
-        upright = bool(watcher.samples) and not watcher.samples[-1].fallen
-        return upright and watcher.walks and watcher.stamp > killed + SETTLING * SECOND
+        return watcher.walks and watcher.stamp > killed + SETTLING * SECOND
 
     def _in_graph(self, name: str) -> set[bytes]:
         """Return the graph's names for the node's sender of diagnostics, each process's another."""
