@@ -46,6 +46,7 @@ SETTLING = 3.0  # [s] after a kill in which the robot may still fall
 STALL = 3.0  # [s] of wall-clock time
 MOVING = (MotionState.WALK, MotionState.KICK)
 SECOND = 1_000_000_000
+RATE = 60  # samples that a second has at most
 
 
 class Sample(NamedTuple):
@@ -86,9 +87,10 @@ class FaultWatcher(TrialWatcher):
 
     @property
     def walks(self) -> bool:
-        """Whether the robot is under way."""
-        now = self.samples[-1] if self.samples else None
-        return now is not None and now.mode == MotionState.WALK and not now.fallen and now.stamp > 3 * SECOND
+        """Whether the robot is under way, and was all through the last second."""
+        last = [sample for sample in self.samples[-RATE:] if sample.stamp > self.stamp - SECOND]
+        steady = all(sample.mode == MotionState.WALK and not sample.fallen for sample in last)
+        return steady and self.stamp > 3 * SECOND
 
     @property
     def over(self) -> bool:

@@ -53,8 +53,10 @@ if __name__ == "__main__":
 LAUNCHER = """
 import sys, time
 from pathlib import Path
+from tulip_ros import launch
 from tulip_ros.launch import Launcher
 from tulip_ros.plan import make_plan
+launch.BUSY = 0.0
 with Launcher(make_plan(["user_input", "game_input"], None), Path(sys.argv[1])) as launcher:
     while True:
         launcher.poll()
@@ -166,7 +168,10 @@ def test_a_keepsake_is_replaced_as_a_whole_and_refuses_more_than_its_page(monkey
     assert Keepsake().read() == {}
 
 
-def test_a_killed_node_comes_back_from_a_process_that_had_imported_what_it_needs(folder: Path) -> None:
+def test_a_killed_node_comes_back_from_a_process_that_had_imported_what_it_needs(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tulip_ros.launch.BUSY", 0.0)
     (folder / "tulip_fake_library.py").write_text(LIBRARY)
     (folder / "tulip_fake_node.py").write_text(NODE)
     with Launcher([Start("a", NodeEntry("a", "tulip_fake_node"), {}, "")], folder / "logs") as launcher:
