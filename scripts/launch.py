@@ -20,7 +20,7 @@ from rich.live import Live
 
 from tulip_ros import network, plan
 from tulip_ros.emergency_stop import StopLink
-from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, require, unknown
+from tulip_ros.errors import EXIT_BAD_INPUT, EXIT_GIVEN_UP, BadInputError, require, unknown
 from tulip_ros.launch import Launcher
 from tulip_ros.log_file import Log
 from tulip_ros.monitor import Monitor
@@ -120,8 +120,8 @@ def keep_running(launcher: Launcher, namespace: str) -> None:
                 while True:
                     for _ in range(round(LOOK / HEED)):
                         spin(HEED)
-                    for line in launcher.poll():
-                        console.print(line, highlight=False, markup=False, soft_wrap=True)
+                        for line in launcher.poll():
+                            console.print(line, highlight=False, markup=False, soft_wrap=True)
                     if console.is_terminal:
                         live.update(monitor.table(launcher.states()), refresh=True)
             except KeyboardInterrupt:
@@ -131,6 +131,10 @@ def keep_running(launcher: Launcher, namespace: str) -> None:
                 raise
     except KeyboardInterrupt:
         console.print("all nodes ended", highlight=False)
+    if launcher.given_up:
+        names = ", ".join(launcher.given_up)
+        console.print(f"error: given up, since it died again and again: {names}", style="bold red", highlight=False)
+        raise typer.Exit(EXIT_GIVEN_UP)
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from tulip_ros.plan import Start
 HUNG = 10.0  # [s] without a sign of life, of which one comes each second: no callback of a node takes a tenth of that
 LIVELY = 3.0  # [s] since the last sign of some other node: else it is the machine that stands still, not the node
 ABSENT = 2.0  # [s] between two polls after which the launcher itself was held up, and begins to watch anew
+BUSY = 10.0  # [s] since the first start, in which the processor has better to do than to have a process wait
 CALM = 5.0  # [s] since the last start, after which there is time to tidy up
 
 
@@ -70,7 +71,7 @@ class Launcher:
         self._tidying: Thread | None = None
         self._untidy = False
         self._killed = ("", 0)  # name of the process that was killed last since it hung, and which of its lives
-        self._last_start = self._last_poll = self._watching_since = 0.0
+        self._first_start = self._last_start = self._last_poll = self._watching_since = 0.0
 
     def __enter__(self) -> Launcher:
         transport.remove_leftovers()
@@ -81,7 +82,7 @@ class Launcher:
         except BaseException:
             self.stop()
             raise
-        self._last_start = self._last_poll = self._watching_since = monotonic()
+        self._first_start = self._last_start = self._last_poll = self._watching_since = monotonic()
         return self
 
     def __exit__(
@@ -114,8 +115,9 @@ class Launcher:
                 said += self._stand_still(process)
         said += self._kill_hung(now)
         said += self._heed_answers()
-        if self._standby is not None and all(each.last_beat for each in self._processes if each.plays):
-            self._standby.start()  # not before: nodes that start need the processor more
+        if self._standby is not None and now - self._first_start > BUSY:
+            if all(each.last_beat for each in self._processes if each.plays):
+                self._standby.start()  # not before: nodes that start need the processor more
         if self._untidy and now - self._last_start > CALM:
             self._tidy_up()
         return said

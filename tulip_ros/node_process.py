@@ -250,8 +250,9 @@ class NodeProcess:
         """Wait for its end, which is near, and do not start it again."""
         if self._child is not None:
             self._exit_code = self._child.end()
+        if not self._ended:
+            self._memory.close()
         self._child, self._ended = None, True
-        self._memory.close()
 
     def _refusal(self) -> str:
         """Return the node's own words: what follows "error: " in its log."""

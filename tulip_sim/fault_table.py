@@ -112,13 +112,16 @@ ROWS: tuple[Row, ...] = (
         ("strategy", "no world_state"),
     ),
     _stopped(
-        "head", GOES_ON, "the head hangs loose; the ball may be lost and searched for" + AGAIN, ("driver", "head_pan")
+        "head",
+        GOES_ON,
+        "the head hangs loose; the ball may be lost and searched for" + AGAIN,
+        ("driver", "commands of the head outlived"),
     ),
     _stopped(
         "motion",
         LIMP,
         "the driver damps the legs after 0.1 s and lets go of them after 0.6 s" + AGAIN,
-        ("driver", "left_hip_yaw"),
+        ("driver", "commands of the legs outlived"),
         seconds=4.0,  # then people set it up
     ),
     _stopped(

@@ -46,6 +46,7 @@ SETTLING = 3.0  # [s] after a kill in which the robot may still fall
 STALL = 3.0  # [s] of wall-clock time
 MOVING = (MotionState.WALK, MotionState.KICK)
 SECOND = 1_000_000_000
+RATE = 60  # samples that a second has at most
 
 
 class Sample(NamedTuple):
@@ -86,8 +87,10 @@ class FaultWatcher(TrialWatcher):
 
     @property
     def walks(self) -> bool:
-        """Whether the robot is under way."""
-        return self.motion is not None and self.motion.mode == MotionState.WALK and self.stamp > 3 * SECOND
+        """Whether the robot is under way, and was all through the last second."""
+        last = [sample for sample in self.samples[-RATE:] if sample.stamp > self.stamp - SECOND]
+        steady = all(sample.mode == MotionState.WALK and not sample.fallen for sample in last)
+        return steady and self.stamp > 3 * SECOND
 
     @property
     def over(self) -> bool:
@@ -258,8 +261,7 @@ class FaultTrial:
         watcher = self.watcher
         if name == "driver":  # another world, whose time began anew
             return 0 < watcher.stamp < killed and watcher.walks
-        upright = bool(watcher.samples) and not watcher.samples[-1].fallen
-        return upright and watcher.walks and watcher.stamp > killed + SETTLING * SECOND
+        return watcher.walks and watcher.stamp > killed + SETTLING * SECOND
 
     def _in_graph(self, name: str) -> set[bytes]:
         """Return the graph's names for the node's sender of diagnostics, each process's another."""
