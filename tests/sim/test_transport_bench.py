@@ -5,6 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 from pathlib import Path
 
+import pytest
+
 from tulip_sim.bench import transport
 
 
@@ -36,9 +38,16 @@ def test_each_transport_makes_one_line_of_all_its_rounds() -> None:
 
 
 def test_every_round_has_each_transport_once_and_begins_with_another() -> None:
-    rounds = [[way for number, way in transport.TRIALS if number == each + 1] for each in range(transport.ROUNDS)]
+    rounds = [[way for number, way in transport.BENCH.trials if number == each + 1] for each in range(transport.ROUNDS)]
     assert all(sorted(ways) == sorted(transport.WAYS) for ways in rounds)
     assert all(first[0] != second[0] for first, second in pairwise(rounds))
+
+
+def test_fewer_rounds_are_a_part_of_all_and_other_options_are_refused() -> None:
+    assert transport.choose({"rounds": "2"}) == transport.trials()[: 2 * len(transport.WAYS)]
+    for options in ({"rounds": "0"}, {"rounds": "-1"}, {"round": "2"}):
+        with pytest.raises(ValueError, match="expected rounds, a number > 0"):
+            transport.choose(options)
 
 
 def test_the_small_segment_is_the_same_profile_without_its_sizes(tmp_path: Path) -> None:

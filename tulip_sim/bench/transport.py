@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,24 @@ WAYS = {
     SMALL: "shared memory as Fast DDS has it, 0.5 MiB",
 }
 PATIENCE = 600.0  # [s] for one trial
+
+
+def trials(rounds: int = ROUNDS) -> list[tuple[int, str]]:
+    """Return what to run: each transport once a round; each round begins with another."""
+    ways = tuple(WAYS)
+    return [(number + 1, ways[(number + turn) % len(ways)]) for number in range(rounds) for turn in range(len(ways))]
+
+
+def choose(options: Mapping[str, str]) -> list[tuple[int, str]]:
+    """Return fewer trials, by option `rounds`.
+
+    Raises:
+        ValueError: if an option is unknown or cannot be used.
+    """
+    rounds = options.get("rounds", str(ROUNDS))
+    if set(options) - {"rounds"} or not rounds.isdecimal() or int(rounds) == 0:
+        raise ValueError(f"options are {dict(options)}; expected rounds, a number > 0")
+    return trials(int(rounds))
 
 
 def measure(number: int, way: str) -> Row:
@@ -108,7 +127,4 @@ def _lost(rows: list[Row], when: str) -> str:
     return f"{sum(row[f'lost{when}'] for row in rows)} of {sum(row[f'sent{when}'] for row in rows)}"
 
 
-ORDER = [tuple(WAYS)[number % len(WAYS) :] + tuple(WAYS)[: number % len(WAYS)] for number in range(ROUNDS)]
-"""Each round begins with another."""
-TRIALS = [(number + 1, way) for number, ways in enumerate(ORDER) for way in ways]
-BENCH = Bench("transport", "Transport", TRIALS, measure, summarize, workers=1)
+BENCH = Bench("transport", "Transport", trials(), measure, summarize, workers=1, choose=choose)
