@@ -80,6 +80,8 @@ def main(
             with Log(log):  # says what is wrong with it before anything starts
                 values["driver"] = {"file": str(log.absolute())}
         starts = plan.make_plan(names, None if driver == "none" else driver, namespace, parameters or (), values)
+        if anyway and not rehearse:
+            raise BadInputError("--anyway is for a rehearsal; give --rehearse with it.")
         if rehearse:
             from _rehearsal import REFUSED, may_launch  # brings the simulator, which others need not wait for
 

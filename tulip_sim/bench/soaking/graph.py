@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -100,15 +101,16 @@ def play(folder: Path, seconds: float, seed: int = 1) -> None:
                 for state in launcher.states()
                 if state.pid
             }
-            spent = {pid: processor_time(pid) for pid in pids.values()}
             period, moment = now - last[0], time.monotonic()
             nodes: dict[str, Sample] = {}
+            spent: dict[int, float] = {}
             for name, pid in pids.items():
-                nodes[name] = resources(pid)
-                if pid in last[2]:
-                    nodes[name][PROCESSOR] = round((spent[pid] - last[2][pid]) / period, 4)
-                if watcher.served[name]:
-                    nodes[name][SERVICE] = round(float(np.mean(watcher.served[name])), 4)
+                with contextlib.suppress(OSError):  # it has ended this moment; the launcher tells
+                    nodes[name], spent[pid] = resources(pid), processor_time(pid)
+                    if pid in last[2]:
+                        nodes[name][PROCESSOR] = round((spent[pid] - last[2][pid]) / period, 4)
+                    if watcher.served[name]:
+                        nodes[name][SERVICE] = round(float(np.mean(watcher.served[name])), 4)
             whole: Sample = {SHARED: shared_memory_files(list(pids.values())), FACTOR: period / (moment - last[1])}
             if watcher.pictures:
                 whole[PICTURE] = round(float(np.mean(watcher.pictures)), 2)
