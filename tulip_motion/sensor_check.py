@@ -1,9 +1,9 @@
 """Tells from the readings alone that a sensor is broken, while the robot can still be brought down softly.
 
-An encoder that sticks. A joint has two: the one at the joint tells its angle, the one at the motor its speed. Noise alone
-makes that a sound encoder soon reads something else; one that reads the very same angle while the motor's speed adds up
-to a way of `encoder_check_limit` does not follow. (A comparison of way and angle alone would not do: a light joint with
-dry friction chatters faster than it is read.)
+An encoder that sticks. A joint has two: the one at the joint tells its angle, the one at the motor its speed. A sound
+encoder's noise alone makes that it soon reads something else; one that reads the very same angle while the motor's
+speed adds up to a way of `encoder_check_limit` does not follow. (A comparison of way and angle alone would not do: a
+light joint with dry friction chatters faster than it is read.)
 
 An IMU that is frozen. Its noise alone makes that no two readings of a gyro are the same; one that reads the same rates
 again and again, and not exactly zero as an ideal one at rest, gives no readings any more.
