@@ -216,7 +216,7 @@ class Motion:
     def tick(self, sensors: Sensors) -> JointCommand:
         """Return the command for the legs that answers one reading of the sensors."""
         self._stamp = sensors.stamp
-        self._broken = self._sensor_check.update(sensors, self._mode in (MotionMode.LIMP, MotionMode.FALLEN))
+        self._broken = self._sensor_check.update(sensors)
         estimate = self._estimate = self._estimator.update(sensors, self._left_weight, self._tracking.com_acceleration)
         self._tilt.update(sensors, estimate.base_rotation, estimate.soles, estimate.loads, self._left_weight)
         self._track_ground(estimate, sensors)

@@ -221,8 +221,7 @@ class MotionParameters:
     fall_confirm_time: float = 0.02  # [s] a sign has to last; impacts ring for less
     upright_tilt: float = 0.25  # [rad] below it, now and after fall_horizon, a limp robot may stand up again
     # Broken sensors, which it goes limp for; see sensor_check.py
-    encoder_check_time: float = 0.5  # [s] over which a joint's angle is compared with its speed
-    encoder_check_limit: float = 0.1  # [rad] between the two
+    encoder_check_limit: float = 0.1  # [rad] that a motor turns while its joint's angle is read the same
     imu_check_time: float = 0.04  # [s] of the same reading; even an IMU of 50 Hz has two different ones in it
     cell_check_time: float = (
         2.0  # [s] of readings of nothing while the foot carries the robot; it walks on all the same

@@ -1,12 +1,9 @@
 """Tells from the readings alone that a sensor is broken, while the robot can still be brought down softly.
 
-An encoder that sticks. A joint has two: the one at the joint tells its angle q, the one at the motor its speed q'.
-What the one says of the way since the last reading has to be what the other says; the difference, forgotten over a
-time T (`encoder_check_time`),
-
-    r(t) = (1 - dt/T) r(t - dt) + q(t) - q(t - dt) - dt (q'(t) + q'(t - dt)) / 2
-
-stays small for a sound joint, and follows the way of one whose angle sticks.
+An encoder that sticks. A joint has two: the one at the joint tells its angle, the one at the motor its speed. A sound
+encoder's noise alone makes that it soon reads something else; one that reads the very same angle while the motor's
+speed adds up to a way of `encoder_check_limit` does not follow. (A comparison of way and angle alone would not do: a
+light joint with dry friction chatters faster than it is read.)
 
 An IMU that is frozen. Its noise alone makes that no two readings of a gyro are the same; one that reads the same rates
 again and again, and not exactly zero as an ideal one at rest, gives no readings any more.
@@ -39,31 +36,18 @@ class SensorCheck:
         self._same_limit = max(1, round(p.imu_check_time / p.control_period))
         self._dead_limit = max(1, round(p.cell_check_time / p.control_period))
         self._last: Sensors | None = None
-        self._drift = np.zeros(len(LEG_JOINTS))
+        self._way = np.zeros(len(LEG_JOINTS))  # [rad] of each motor since its joint's angle was last read anew
         self._same = 0
         self._silent = np.zeros((2, len(CELL_NAMES)), dtype=int)  # readings of zero in a row while the foot carries
         self._stuck = ""
 
-    @property
-    def drift(self) -> Array:
-        """(12,) by how much angles and speeds of the leg joints disagree at present [rad]."""
-        return self._drift
-
-    def update(self, sensors: Sensors, limp: bool = False) -> str:
-        """Take a reading; return why the robot cannot be controlled by it, in words, or "".
-
-        Args:
-            sensors: The reading.
-            limp: Whether the legs hang loose: on impacts, joints without control jerk more than two readings tell.
-        """
+    def update(self, sensors: Sensors) -> str:
+        """Take a reading; return why the robot cannot be controlled by it, in words, or ""."""
         last, self._last = self._last, sensors
         self._check_cells(sensors.foot_cells)
         if last is None or sensors.stamp <= last.stamp:
             return self._stuck
-        if limp:
-            self._drift[:] = 0.0
-        else:
-            self._check_encoders(last, sensors)
+        self._check_encoders(last, sensors)
         rates = sensors.imu_angular_velocity
         same = bool((rates == last.imu_angular_velocity).all()) and bool(rates.any())
         self._same = self._same + 1 if same else 0
@@ -82,17 +66,15 @@ class SensorCheck:
         )
 
     def _check_encoders(self, last: Sensors, sensors: Sensors) -> None:
-        p, n = self._parameters, len(LEG_JOINTS)
+        way, n = self._way, len(LEG_JOINTS)
         dt = (sensors.stamp - last.stamp) * 1e-9
         if dt > self._longest:
             return
-        drift = self._drift
-        drift *= 1.0 - dt / p.encoder_check_time
-        drift += sensors.joint_positions[:n] - last.joint_positions[:n]
-        drift -= 0.5 * dt * (sensors.joint_velocities[:n] + last.joint_velocities[:n])
-        worst = int(np.abs(drift).argmax())
-        if not self._stuck and abs(drift[worst]) > p.encoder_check_limit:
-            self._stuck = f"the encoder of {LEG_JOINTS[worst]} sticks: its angle does not follow the motor's speed"
+        way += 0.5 * dt * (sensors.joint_velocities[:n] + last.joint_velocities[:n])
+        way[sensors.joint_positions[:n] != last.joint_positions[:n]] = 0.0
+        if not self._stuck and np.abs(way).max() > self._parameters.encoder_check_limit:
+            name = LEG_JOINTS[int(np.abs(way).argmax())]
+            self._stuck = f"the encoder of {name} sticks: its angle does not follow the motor's speed"
 
     def _check_cells(self, cells: Sequence[Sequence[float]] | Array) -> None:
         values = np.asarray(cells)

@@ -128,15 +128,15 @@ class Launcher:
 
     def stop(self) -> None:
         """End all processes: the body's driver first, the recorder last. Leave nothing of theirs behind."""
+        drivers = [process for process in self._processes if process.entry.name == DRIVER]
+        recorders = [process for process in self._processes if process.entry.name == "recorder"]
+        others = [process for process in self._processes if process not in (*drivers, *recorders)]
+        end_in_order(drivers, others, recorders)
         for request in self._requests.values():
             request.kill()
             request.wait()
         if self._standby is not None:
             self._standby.end()
-        drivers = [process for process in self._processes if process.entry.name == DRIVER]
-        recorders = [process for process in self._processes if process.entry.name == "recorder"]
-        others = [process for process in self._processes if process not in (*drivers, *recorders)]
-        end_in_order(drivers, others, recorders)
         if self._tidying is not None:
             self._tidying.join()
         # Not only after a kill: now and then Fast DDS leaves a port behind of nodes that end at the same time.

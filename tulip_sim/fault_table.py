@@ -25,7 +25,7 @@ class Way(Enum):
     """How a signal makes a process ill."""
 
     STOPPED = "SIGSTOP"
-    SLOW = "SIGSTOP for 80 ms, SIGCONT for 20 ms, and so on"
+    SLOW = "SIGSTOP for 60 ms, SIGCONT for 40 ms, and so on"
     STALLED = "SIGSTOP for 3 s"
     HUNG = "SIGSTOP, and nobody continues it"
 

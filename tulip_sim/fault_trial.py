@@ -41,7 +41,7 @@ END = 2.0  # [s] at the end of what is watched, in which a robot that stands or 
 SOFT = 8.0  # [N m] least torque in the legs that is more than damping of what still rolls
 SILENT = 0.3  # [s] without news of motion control, after which it is not known to do anything
 SILENCE = 90.0  # [s] of wall-clock time without the simulator, after which the trial is given up
-STOPPED, RUNNING = 0.08, 0.02  # [s] of wall-clock time that a slow node is stopped, and runs, in turn
+STOPPED, RUNNING = 0.06, 0.04  # [s] of wall-clock time that a slow node is stopped, and runs, in turn
 SETTLING = 3.0  # [s] after a kill in which the robot may still fall
 STALL = 3.0  # [s] of wall-clock time
 MOVING = (MotionState.WALK, MotionState.KICK)
@@ -298,7 +298,7 @@ class FaultTrial:
 
 @contextmanager
 def _slowed(pid: int) -> Iterator[None]:
-    """Have a process run a fifth of the time."""
+    """Have a process run two fifths of the time."""
     child = os.fork()
     if child == 0:  # a process of its own: this one has to watch
         try:

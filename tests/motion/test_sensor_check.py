@@ -41,7 +41,6 @@ def test_nothing_is_said_of_sound_sensors() -> None:
     check = SensorCheck(PARAMETERS)
     assert {check.update(sensors) for sensors in readings(20.0)} == {""}
     assert check.dead_cells == ()
-    assert np.abs(check.drift).max() < 0.2 * PARAMETERS.encoder_check_limit
 
 
 def test_an_encoder_that_sticks_is_named_when_its_joint_has_moved_by_little_more_than_the_limit() -> None:
@@ -60,12 +59,13 @@ def test_an_encoder_that_sticks_is_named_when_its_joint_has_moved_by_little_more
     assert check.update(replace(sensors, stamp=sensors.stamp + 1)).startswith("the encoder of left_knee sticks")
 
 
-def test_joints_that_jerk_while_the_legs_hang_loose_are_not_taken_for_stuck_ones() -> None:
-    check = SensorCheck(PARAMETERS)
-    for tick, sensors in enumerate(readings(2.0)):
-        jerk = np.zeros(14)
-        jerk[KNEE] = 0.3 * (tick % 2)  # between two readings, without any speed in them
-        assert check.update(replace(sensors, joint_positions=sensors.joint_positions + jerk), limp=True) == ""
+def test_a_light_joint_that_chatters_faster_than_it_is_read_is_not_taken_for_a_stuck_one() -> None:
+    check, rng = SensorCheck(PARAMETERS), np.random.default_rng(2)
+    for sensors in readings(5.0, swing=0.0):
+        position, velocity = sensors.joint_positions.copy(), sensors.joint_velocities.copy()
+        position[5] = 2.0**-13 * round(1e-4 * rng.standard_normal() * 2**13)  # rests, but for noise
+        velocity[5] = 0.5  # always read in the same phase
+        assert check.update(replace(sensors, joint_positions=position, joint_velocities=velocity)) == ""
 
 
 def test_a_frozen_imu_is_told_after_its_time_and_forgiven_when_it_reads_again() -> None:
@@ -102,7 +102,6 @@ def test_a_dead_cell_is_named_and_cells_of_a_foot_in_the_air_are_not() -> None:
 
 def test_readings_far_apart_say_nothing_about_encoders() -> None:
     check = SensorCheck(PARAMETERS)
-    before, *_, after = readings(0.3)
+    before, *_, after = readings(1.0)
     check.update(before)
-    assert check.update(after) == ""
-    assert not check.drift.any()
+    assert check.update(replace(after, joint_positions=before.joint_positions)) == ""

@@ -122,3 +122,13 @@ def test_robot_walks_on_with_a_dead_force_cell_and_names_it() -> None:
     assert any("force cell dead: left toe outer" in note for note in broken.trial.motion.notes)
     assert broken.trial.referee.falls == 0
     broken.trial.close()
+
+
+@pytest.mark.sim
+def test_robot_stands_still_when_pictures_stop_and_the_referee_s_time_goes_on() -> None:
+    broken = Broken("camera")
+    broken.go_on(4.5)  # 2 s until it is blind, and some steps to stop
+    assert broken.go_on(1.0) == {MotionMode.STAND}
+    assert broken.trial.doing.endswith("blind > stand")
+    assert broken.trial.referee.falls == 0
+    broken.trial.close()
