@@ -20,6 +20,7 @@ from typing import IO
 ADDRESSES = ("10.217.64.1", "10.217.64.2")
 PATIENCE = 30.0  # [s] of wall-clock time for what takes a fraction of a second
 DIES_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl(2)
+NOBODY = "02:00:00:00:00:01"  # an address of Ethernet that no interface has
 SET_UP = "mount -t tmpfs -o size=1g tmpfs /dev/shm && ip link set lo up && echo ready && exec sleep infinity"
 
 
@@ -125,6 +126,16 @@ class Cable:
 
     def mend(self) -> None:
         self.operator.ip("link", "set", "eth0", "up")
+
+    def lose(self) -> None:
+        """Let both ends send as before, but to nobody, as by a radio that is out of reach."""
+        for machine, other in ((self.robot, self.operator), (self.operator, self.robot)):
+            machine.ip("neigh", "replace", other.address, "lladdr", NOBODY, "nud", "permanent", "dev", "eth0")
+
+    def find(self) -> None:
+        """End `lose`."""
+        for machine, other in ((self.robot, self.operator), (self.operator, self.robot)):
+            machine.ip("neigh", "del", other.address, "dev", "eth0")
 
 
 @contextmanager
