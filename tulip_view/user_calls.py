@@ -103,7 +103,7 @@ class UserCalls:
             reason: In words, as in "key l".
         """
         with self._order:
-            self._next_walk = None
+            self._next_walk = self._walk = None
             self._stop.engage(reason)
         self._tell(Outcome("emergency stop", "sent"))
 

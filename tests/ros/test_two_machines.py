@@ -18,6 +18,8 @@ from two_machines import ADDRESSES, Cable, Machine, NotAllowedError, Program, tw
 from tulip_ros import topics
 from tulip_ros.log_file import Log
 from tulip_ros.time import stamp_of
+from tulip_sim.bench.faces_lookers.looker import READY
+from tulip_view.live.beside import PORT
 
 pytestmark = [pytest.mark.ros, pytest.mark.sim, pytest.mark.slow]
 
@@ -61,6 +63,15 @@ def launch(machine: Machine, log: Path, *arguments: str) -> Program:
     return machine.start(sys.executable, str(SCRIPTS / "launch.py"), *arguments, "--logs", f"{log}_logs", log=log)
 
 
+def page_shows(machine: Machine) -> bool:
+    """Return whether a program that takes all that the page sends gets something; a busy machine's page comes late."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        if machine.start(sys.executable, "-m", "tulip_sim.bench.faces_lookers.page", str(PORT)).ask() == READY:
+            return True
+    return False
+
+
 @pytest.fixture
 def cable(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Cable]:
     for name in ("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"):
@@ -80,13 +91,12 @@ def test_the_operator_steers_over_the_cable_and_the_robot_plays_on_without_it(ca
     of_robot = launch(cable.robot, tmp_path / "robot", *NODES, "--parameters", str(parameters), "--network", OPERATOR)
     record = tmp_path / "record"
     of_operator = launch(cable.operator, tmp_path / "operator", "view", "--record", str(record), "--network", ROBOT)
-    page = cable.operator.start(sys.executable, "-m", "tulip_sim.bench.faces_lookers.page", "8080")
     operator = Seat(cable.operator, tmp_path / "operator_menu", ROBOT)
     robot = Seat(cable.robot, tmp_path / "robot_menu")  # at the robot's own console: sees what happens without a cable
 
     # All comes over the cable, and the page shows it.
     operator.until(lambda seen: seen["mode"] == "stand" and not seen["missing"] and seen["time"] > 2.0)
-    assert page.ask() == "sees something"
+    assert page_shows(cable.operator)
 
     # The operator starts the robot. The cable is cut for longer than it takes to be forgotten; the robot plays on.
     operator.press("s")

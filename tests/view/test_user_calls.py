@@ -50,6 +50,7 @@ def slow() -> Iterator[Slow]:
             return response
 
         server.create_service(topics.SET_USER_COMMAND.type, topics.SET_USER_COMMAND.name, on_wish)
+        server.create_service(topics.RELEASE_STOP.type, topics.RELEASE_STOP.name, lambda _, response: response)
         executor.add_node(server)
         calls = UserCalls(node, Asker(node), "face", "", told.append)
         while not calls.reaches_user_input:
