@@ -257,6 +257,7 @@ def _disturbing(values: Mapping[str, str]) -> Iterator[Found]:
             part,
             f"ROS_DOMAIN_ID is {domain}; above 101 its ports may be taken by other programs: choose 0 to 101",
         )
+    profile = values.get("FASTRTPS_DEFAULT_PROFILES_FILE") or values.get("FASTDDS_DEFAULT_PROFILES_FILE", "")
     reach = values.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "")
     if reach not in ("", *RANGES):
         yield Found(
@@ -266,9 +267,15 @@ def _disturbing(values: Mapping[str, str]) -> Iterator[Found]:
         )
     elif reach == "OFF" and not values.get("ROS_STATIC_PEERS"):
         yield Found(ERROR, part, "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: nodes do not find each other; set LOCALHOST")
+    if not profile and (reach in ("SUBNET", "SYSTEM_DEFAULT") or values.get("ROS_STATIC_PEERS")):
+        yield Found(
+            WARNING,
+            part,
+            "ROS_AUTOMATIC_DISCOVERY_RANGE or ROS_STATIC_PEERS looks beyond this machine, but the transport's profile"
+            " keeps to it: use option --network in their place",
+        )
     if values.get("ROS_DISCOVERY_SERVER"):
         yield Found(WARNING, part, "ROS_DISCOVERY_SERVER is set: without that server nodes do not find each other")
-    profile = values.get("FASTRTPS_DEFAULT_PROFILES_FILE") or values.get("FASTDDS_DEFAULT_PROFILES_FILE", "")
     if profile and not Path(profile).exists():
         yield Found(
             ERROR, part, f"the profile of Fast DDS {profile} does not exist: unset FASTRTPS_DEFAULT_PROFILES_FILE"

@@ -7,7 +7,12 @@ import sys
 import _environment
 
 if __name__ == "__main__":
-    wants = {"bench": {"clik", "log", "vision"}, "view": {"faces"}, "bridge": {"faces"}, "mujoco": {"engines"}}
+    wants = {
+        "bench": {"clik", "log", "vision"},
+        "view": {"faces"},
+        "bridge": {"faces"},
+        "mujoco": {"drivers", "engines"},
+    }
     _environment.prepare(tuple(extra for extra, benches in wants.items() if benches & set(sys.argv)))
 
 import json
@@ -28,9 +33,11 @@ from tulip_sim.bench import (
     challenges,
     clik,
     control,
+    drivers,
     dynamics,
     engines,
     faces,
+    faults,
     head,
     identify,
     ilc,
@@ -46,6 +53,7 @@ from tulip_sim.bench import (
     soak,
     strategy,
     stress,
+    transport,
     vision,
     walk,
 )
@@ -54,7 +62,8 @@ from tulip_view.fuzz import bench as fuzz
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress, engines),
-    *(simcheck, vision, localization, ball, head, latency, log, faces, identify, dynamics, fuzz, soak),
+    *(simcheck, vision, localization, ball, head, latency, log, faces, faults, drivers, transport, identify, dynamics),
+    *(fuzz, soak),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"

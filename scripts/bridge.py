@@ -11,7 +11,9 @@ import sys
 from typing import Annotated
 
 import typer
+from _network import Network
 
+from tulip_ros import network
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, require
 from tulip_ros.run import run
 from tulip_view.bridge.settings import LAN, LAN_MEANS, LOOPBACK, PORT, BridgeParameters
@@ -23,11 +25,13 @@ def main(
     origin: Annotated[
         list[str] | None, typer.Option(help="Page that may connect, too, as in http://192.168.0.7:8080; repeatable.")
     ] = None,
+    peers: Network = "",
 ) -> None:
     """Open a WebSocket for Foxglove: topics, services, parameters."""
     try:
         require("foxglove", "bridge")
         settings = BridgeParameters(LAN if lan else LOOPBACK, port, tuple(origin or ()))
+        network.join(peers)
     except (BadInputError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from None

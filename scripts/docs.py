@@ -1,4 +1,4 @@
-"""Write the generated parts of the pages anew: the node graph, the tables of topics and of diagnostics, the trees."""
+"""Write the generated parts of the pages anew: the node graph, tables of topics, diagnostics and faults, the trees."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tulip_description.field import load_field
-from tulip_ros.health_table import markdown_table
+from tulip_ros.health_table import markdown_table as health_table
 from tulip_ros.topics import markdown_graph, markdown_tables
+from tulip_sim.fault_table import markdown_table as fault_table
 from tulip_strategy.behaviour.tree import STRATEGIES
 from tulip_strategy.parameters import StrategyParameters
 from tulip_strategy.strategy import Strategy
@@ -26,7 +27,8 @@ def parts() -> Iterator[tuple[str, str, str]]:
     """Return the generated parts: page, name of the block, content."""
     yield "architecture.md", "graph", markdown_graph()
     yield "architecture.md", "topics", markdown_tables()
-    yield "diagnostics.md", "health", markdown_table()
+    yield "diagnostics.md", "health", health_table()
+    yield "safety.md", "faults", fault_table()
     tree = Strategy(StrategyParameters(), load_field()).tree
     yield "strategy.md", "game", mermaid(tree, 0, depth=1)
     for name in STRATEGIES:

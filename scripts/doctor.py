@@ -19,6 +19,9 @@ from _installation import ERROR, OK, WARNING, Found, check_all, interpreter
 
 sys.path.insert(0, str(_environment.ROOT))  # where nothing is installed, the packages lie there
 
+from tulip_ros import network
+from tulip_ros.errors import BadInputError
+
 EXIT_CODES = {OK: 0, WARNING: 1, ERROR: 2}
 COLOURS = {OK: "32", WARNING: "33", ERROR: "31"}
 START = 60.0  # [s] that ROS may take to start and to end
@@ -35,7 +38,13 @@ def main(arguments: Sequence[str]) -> int:
         help="make or update .venv if it needs that, and remove what dead processes left in shared memory",
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument(network.OPTION, default="", metavar=network.METAVAR, help=network.HELP)
     chosen = parser.parse_args(arguments)
+    try:
+        network.join(chosen.network)
+    except BadInputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_CODES[ERROR]
     if chosen.mend:
         mend()
     found: list[Found] = []

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+
 import _environment
 
 if __name__ == "__main__":
-    _environment.prepare()
+    _environment.prepare(("mujoco",) if "mujoco" in sys.argv else ())
 
-import sys
 from typing import Annotated, Any
 
 import typer
@@ -24,6 +25,7 @@ from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, unknown
 BODIES: dict[str, tuple[str, dict[str, Any]]] = {
     "echo": ("tulip_driver.echo:EchoBody", {}),
     "sim": ("tulip_sim.simulated_body:SimulatedBody", {"harness": True}),
+    "mujoco": ("tulip_sim.simulated_body:SimulatedBody", {"harness": True, "engine": "mujoco"}),
     "log": ("tulip_driver.log_body:LogBody", {}),
     "wire": ("tulip_driver.wire.body:WireBody", {}),
 }

@@ -20,10 +20,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from _network import Network
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from tulip_driver.wire.links import PORT as WIRE_PORT
+from tulip_ros import network
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, check_writable, require, unknown
 from tulip_ros.picture_rate import PICTURE_RATE, PictureRate
 from tulip_ros.plan import Start
@@ -91,6 +93,7 @@ def main(
     wire_port: Annotated[int, typer.Option(help="UDP port of that body.", min=1, max=65535)] = WIRE_PORT,
     view: Annotated[bool, typer.Option("--view", help="Open a page to watch and steer in a browser (graph).")] = False,
     view_port: Annotated[int, typer.Option(help="TCP port of that page.", min=1, max=65535)] = PORT,
+    peers: Network = "",
 ) -> None:
     """Play one trial, or a match of two robots.
 
@@ -116,8 +119,10 @@ def main(
             raise BadInputError(f"--driver is {driver!r}; expected one of {', '.join(DRIVERS)}.")
         if driver == "wire" and (mode != "graph" or teams == 2):
             raise BadInputError("--driver wire is for one robot as a graph; expected --mode graph --teams 1.")
-        if mode != "graph" and (parameters or logs or view):
-            raise BadInputError("--parameters, --logs and --view are for nodes; expected --mode graph with them.")
+        if mode != "graph" and (parameters or logs or view or peers):
+            raise BadInputError(
+                "--parameters, --logs, --view and --network are for nodes; expected --mode graph with them."
+            )
         kinds = tuple(PICTURES) if mode == "graph" else KINDS
         if pictures not in kinds:
             raise BadInputError(f"--pictures is {pictures!r}; expected one of {', '.join(kinds)} in mode {mode}.")
@@ -132,6 +137,7 @@ def main(
                 raise BadInputError("--eyes is for one robot, or for --mode lockstep; expected camera with two.")
         if json_path is not None:
             check_writable(json_path, "--json")
+        network.join(peers)
         page = page_beside(view_port, NAMESPACES[0] if teams == 2 else "") if view else ()
         if view:
             console.print(f"watch it at {address(view_port)}", highlight=False)

@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from _network import Network
 
+from tulip_ros import network
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
 from tulip_ros.mcap_file import COMPRESSIONS
 from tulip_ros.picture_rate import PICTURE_RATE
@@ -50,6 +52,7 @@ def main(
         bool, typer.Option("--wait", help="Begin when the menu, or the service start_recording, says so.")
     ] = False,
     namespace: Annotated[str, typer.Option(help="Namespace of the robot, as in 'striker'.")] = "",
+    peers: Network = "",
 ) -> None:
     """Record all topics, or those that match."""
     try:
@@ -67,6 +70,7 @@ def main(
             split_size=split_size,
             split_time=split_time,
         )
+        network.join(peers)
     except (BadInputError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from None

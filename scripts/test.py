@@ -35,10 +35,12 @@ def main() -> int:
             failed.append(" ".join(check))
     if not arguments:
         print("== pytest", flush=True)
+        # Tests that run nodes follow each other in one process (tests/conftest.py), all others meanwhile in another.
+        arguments = ["-n", "2", "--dist", "loadgroup"]
     if failed:
         print(f"failed before the tests: {', '.join(failed)}", flush=True)
     code = subprocess.run(
-        [sys.executable, "-m", "pytest", "-rs", *arguments], cwd=_environment.ROOT, env=variables
+        [sys.executable, "-m", "pytest", "-rs", "--durations=25", *arguments], cwd=_environment.ROOT, env=variables
     ).returncode
     if code == NO_TESTS:
         print("pytest ran no test", file=sys.stderr)

@@ -15,7 +15,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from _network import Network
 
+from tulip_ros import network
 from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError, require
 from tulip_ros.plan import check_namespace
 from tulip_ros.run import session
@@ -31,12 +33,16 @@ def main(
     lan: Annotated[
         bool, typer.Option("--lan", help="Let other computers open the page: all in the network can steer the robot.")
     ] = False,
+    peers: Network = "",
 ) -> None:
     """Serve the page until Ctrl-C; open its address in a browser."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         require(*LIBRARY)
+        if recording is not None and peers:
+            raise BadInputError("--network is for a robot that runs; leave it out with a recording.")
         if recording is None:
+            network.join(peers)
             show_running(check_namespace(robot or ""), port, lan)
         else:
             from tulip_view.live.view_log import show_recording

@@ -13,7 +13,17 @@ from hypothesis import HealthCheck, settings
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")
 
+GRAPH = {"ros_domain", "module_ros_domain"}
+"""Fixtures of tests that run nodes: one after the other, since a graph fills two cores."""
 DOMAINS = 102  # above 101 the ports collide with those that the system gives out
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tell pytest-xdist what belongs together: all tests that run nodes, and of the others those of a file."""
+    for item in items:
+        runs_nodes = bool(GRAPH & set(getattr(item, "fixturenames", ())))
+        item.add_marker(pytest.mark.xdist_group("graph" if runs_nodes else str(item.path)))
 
 
 def _is_free(domain: int) -> bool:

@@ -48,6 +48,7 @@ class Sensors:
             heel outer, toe inner, toe outer.
         joint_temperatures: (14,) of the motors [deg C], NaN where unknown; None: the body measures none.
         battery: None: the body does not tell.
+        emergency: Why the body asks for an emergency stop, as in "its stop button is pressed"; "" if it does not.
     """
 
     stamp: int
@@ -60,6 +61,7 @@ class Sensors:
     foot_cells: Array
     joint_temperatures: Array | None = None
     battery: Battery | None = None
+    emergency: str = ""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState
 from std_msgs.msg import String
 
+from tulip_description.emergency_stop import StopWord
 from tulip_description.robot import load_robot
 from tulip_description.robot_io import Battery, Sensors
 from tulip_description.urdf import build_urdf
@@ -28,6 +29,7 @@ from tulip_driver.loop import BodyLoop
 from tulip_motion.messages import joint_command_from_message, sensors_to_messages
 from tulip_msgs.msg import JointCommand as JointCommandMessage
 from tulip_ros import topics
+from tulip_ros.emergency_stop import StopLink
 from tulip_ros.errors import BadInputError
 from tulip_ros.finding import Finding, Level
 from tulip_ros.run import ComponentNode, run
@@ -36,8 +38,10 @@ from tulip_ros.time import header, to_message
 CLOCKS = ("host", "body")
 SILENCE = 0.1  # [s] of wall-clock time without a new reading after which somebody is told
 SLOW_TICKS, SECOND_TICKS = 5, 250  # readings between two messages of /clock, and of the battery
+TOLD = 0.2  # [s] at most until everybody knows of a body that is lost
 SHARE = 0.75  # of PERIOD that a body with a clock of its own waits for the answer to its last reading
 AT_ONCE = 4  # messages that are handled in a tick though the answer is in: no sender shall wait for long
+LISTENING = 1.0  # [s] at the start without commands, in which an emergency stop that holds gets known: 0.8 s measured
 
 Spin = Callable[[float], None]
 """Waits up to so many seconds [s] for messages and handles them."""
@@ -91,6 +95,8 @@ class BodyNode(ComponentNode):
             description.publish(String(data=build_urdf(self._robot)))
             self.listen(topics.LEG_COMMAND, self._on_command)
             self.listen(topics.HEAD_JOINT_COMMAND, self._on_command)
+            self.emergency_stop = StopLink(self, "driver", self._on_emergency_stop)
+            self.health.check(self.emergency_stop.finding)
             self.health.check(lambda: silent_joints(self.loop.silent_joints))
             self.health.check(self._body_health)
             self.health.check(self._condition)
@@ -99,6 +105,7 @@ class BodyNode(ComponentNode):
             raise BadInputError(str(error)) from error
         self._readings = 0
         self._heard = self._due = time.monotonic()
+        self._obeys_from = self._due + LISTENING
 
     def advance(self, spin: Spin) -> None:
         """Exchange once, when it is time."""
@@ -107,10 +114,14 @@ class BodyNode(ComponentNode):
             reading = self.loop.tick()
         except BodyError as error:
             self.get_logger().fatal(f"the body is lost: {error}")
+            self.emergency_stop.engage(f"the body is lost: {error}")
+            self.emergency_stop.wait_until_told(TOLD)
             raise SystemExit(1) from error  # whoever launched it starts it again
         if reading is not None:
             self._heard = time.monotonic()
             self._tell(reading)
+            if reading.emergency and not self.emergency_stop.engaged:
+                self.emergency_stop.engage(reading.emergency)
         elif self.loop.faults:
             self.health.count("refused readings", self.loop.fault, self.loop.faults)
             self.loop.faults = 0
@@ -147,18 +158,25 @@ class BodyNode(ComponentNode):
         self._readings += 1
 
     def _on_command(self, message: JointCommandMessage) -> None:
+        if time.monotonic() < self._obeys_from:
+            return
         reason = self.loop.accept(joint_command_from_message(message))
-        if reason:
+        if reason and not self.emergency_stop.engaged:
             self.health.count("refused joint commands", f"joint command refused: {reason}")
 
     def _body_health(self) -> Finding | None:
-        """Tell whether the body is silent or limp."""
+        """Tell whether the body is silent."""
         silence = time.monotonic() - self._heard
         if silence > SILENCE:
             words = f"the body has sent no reading for {silence:.1f} s: is it switched on and connected?"
             return Finding(Level.ERROR, words)
-        reason = self.loop.limp_reason
-        return Finding(Level.WARNING, f"the robot was made limp: {reason}") if reason else None
+        return None
+
+    def _on_emergency_stop(self, word: StopWord) -> None:
+        if word.engaged:
+            self.loop.limp(str(word))
+        else:
+            self.loop.release()
 
     def _condition(self) -> Finding | None:
         """Tell how hot the motors are and how full the battery is."""

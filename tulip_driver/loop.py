@@ -50,7 +50,6 @@ class BodyLoop:
     ) -> None:
         self._body, self._clock = body, clock
         self._guard, self._limiter = Guard(robot, parameters), Limiter(robot, rate)
-        self._too_old = parameters.time_to_live * MILLISECOND
         n = len(robot.joint_names)
         self._shapes = {
             "joint_positions": (n,),
@@ -101,20 +100,15 @@ class BodyLoop:
         """Joints whose last command is older than its time-to-live."""
         return self._guard.silent_joints(self.now)
 
-    @property
-    def limp_reason(self) -> str:
-        """Why the robot was made limp; "" if it was not."""
-        return self._guard.limp_reason
-
     def accept(self, command: JointCommand) -> str:
         """Take a command for a group of joints; return "" or why it is not taken."""
         if self.sensors is None:
             return "no reading of the body has come yet; expected a command that answers one"
-        age = self.sensors.stamp - command.stamp
-        if age > self._too_old or age < 0:
+        age, life = self.sensors.stamp - command.stamp, self._guard.life(command.names)
+        if age > life or age < 0:
             return (
                 f"it answers sensors of {command.stamp} ns, the newest are of {self.sensors.stamp} ns; expected them or"
-                f" older ones by {self._too_old / MILLISECOND:.0f} ms at most"
+                f" older ones by {life / MILLISECOND:.0f} ms at most"
             )
         return self._guard.accept(command, self.now)
 
@@ -128,7 +122,7 @@ class BodyLoop:
         self._limiter.begin_anew()
 
     def tick(self) -> Sensors | None:
-        """Exchange once.
+        """Exchange once. A body that asks for an emergency stop is limp from the next exchange on, until `release`.
 
         Returns:
             A new reading, in the driver's time; None if the body had no new one, or one that cannot be used.
@@ -158,6 +152,8 @@ class BodyLoop:
         if self._clock is not None:
             reading = replace(reading, stamp=self._body_clock.to_host(reading.stamp, self._clock()))
         self.sensors, self._arrived = reading, monotonic_ns()
+        if reading.emergency:
+            self.limp(reading.emergency)
         return reading
 
     def _forget_time(self) -> None:

@@ -120,6 +120,18 @@ class HeadMovement:
             damping=np.full(2, p.damping),
         )
 
+    def limp(self, stamp: int, head_positions: Array) -> JointCommand:
+        """Return the command that leaves the joints alone; the next `update` begins where they are then.
+
+        Args:
+            stamp: Of the joint positions [ns].
+            head_positions: (2,) measured pan and tilt [rad].
+        """
+        self._stamp = None
+        self._sequence += 1
+        zero = np.zeros(2)
+        return JointCommand(self._sequence, stamp, HEAD_JOINTS, head_positions, zero, zero, zero, zero)
+
     def _goal(self, stamp: int, command: HeadCommand) -> tuple[Array, Array, float]:
         """Return where the joints shall go, how that moves on, and how fast they may go there."""
         p, still = self._parameters, np.zeros(2)

@@ -11,6 +11,7 @@ from tulip_motion.interface import HeadCommand, HeadMode
 from tulip_motion.messages import head_command_from_message, joint_command_to_message
 from tulip_msgs.msg import HeadCommand as HeadCommandMessage
 from tulip_ros import topics
+from tulip_ros.emergency_stop import StopLink
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.time import stamp_of
 
@@ -26,6 +27,7 @@ class HeadNode(ComponentNode):
         self._settings = self.load(HeadParameters())
         self.begin_anew()
         self._publisher = self.sender(topics.HEAD_JOINT_COMMAND)
+        self._emergency_stop = StopLink(self, "head")
         self.listen(topics.HEAD_COMMAND, self._on_command)
         self.listen(topics.JOINT_STATES, self._on_joints)
 
@@ -52,7 +54,11 @@ class HeadNode(ComponentNode):
             )
             return
         angles = np.array([positions[name] for name in HEAD_JOINTS])
-        self._publisher.publish(joint_command_to_message(self._head.update(stamp, self._command, angles)))
+        if self._emergency_stop.engaged:
+            order = self._head.limp(stamp, angles)
+        else:
+            order = self._head.update(stamp, self._command, angles)
+        self._publisher.publish(joint_command_to_message(order))
 
 
 def main() -> None:

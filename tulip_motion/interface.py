@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,6 +145,24 @@ class Odometry:
     distance: float
     covariance: Array = field(default_factory=lambda: np.zeros((6, 6)))
     twist_covariance: Array = field(default_factory=lambda: np.zeros((6, 6)))
+
+
+class Whereabouts(NamedTuple):
+    """What motion control that is started anew has to know to go on in the same odom.
+
+    Attributes:
+        stamp: [ns].
+        base: (x, y) of base_link in odom [m].
+        heading_offset: Heading of base_link in odom less that of the IMU [rad].
+        distance: Path length walked since the start [m].
+        uncertainty: 16 numbers by rows, covariance of x, y [m], yaw [rad] and its drift [rad/s].
+    """
+
+    stamp: int
+    base: Sequence[float]
+    heading_offset: float
+    distance: float
+    uncertainty: Sequence[float]
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ from tulip_motion.interface import (
     Support,
     WalkCommand,
     WalkMode,
+    Whereabouts,
 )
 from tulip_motion.inverse_kinematics import rotation_z
 from tulip_motion.kick import Kick, moved
@@ -40,6 +41,7 @@ from tulip_motion.odometry import DeadReckoning
 from tulip_motion.paper_gait import PaperGait
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import reach
+from tulip_motion.sensor_check import SensorCheck
 from tulip_motion.stabilizer import Balance, SupportArea, stabilize
 from tulip_motion.state_estimator import Estimate, StateEstimator, centre_of_pressure
 from tulip_motion.tilt_filter import TiltFilter
@@ -80,6 +82,7 @@ class Motion:
         self._soles = robot.feet
         self._reach = reach(p, robot)
         self._command = WalkCommand(0, WalkMode.STAND)
+        self._stopped = ""  # why an emergency stop holds
         self._mode = MotionMode.STAND
         self._reason = ""
         self._gait: Walking | PaperGait | Kick | None = None
@@ -93,6 +96,8 @@ class Motion:
         self._ground = GroundTrack(p, [foot.cells for foot in robot.feet])
         self._shift = (0.0, 0.0)  # [m] of base_link in odom by slips since the feet were last put where they are
         self._falls = FallDetector(p)
+        self._sensor_check = SensorCheck(p)
+        self._broken = ""  # why the sensors cannot be used, in words
         self._area: SupportArea | None = None
         self._tilt = TiltFilter(p.control_period, p.imu_bias_time, p.imu_bias_limit)
 
@@ -114,7 +119,21 @@ class Motion:
         goal = (command.goal.x, command.goal.y, command.goal.yaw)
         if not all(math.isfinite(value) for value in goal):
             raise ValueError(f"walk goal is {goal}; expected finite numbers")
-        self._command = command
+        if not self._stopped:
+            self._command = command
+
+    def stop(self, reason: str) -> None:
+        """Be limp from the next tick on, whatever is commanded, until `release`.
+
+        Args:
+            reason: In words, not empty.
+        """
+        self._stopped = reason
+        self._command = WalkCommand(self._stamp, WalkMode.LIMP)
+
+    def release(self) -> None:
+        """Take commands again; the legs stay limp until one says otherwise."""
+        self._stopped = ""
 
     @property
     def stance(self) -> Side:
@@ -127,7 +146,14 @@ class Motion:
         if self._mode in (MotionMode.LIMP, MotionMode.FALLEN):
             return ()
         gait = self._gait.notes if isinstance(self._gait, Walking | PaperGait) else ()
-        return (*gait, *self._tracking.notes)
+        dead = self._sensor_check.dead_cells
+        cells = (f"force cell dead: {', '.join(dead)}",) if dead else ()
+        return (*gait, *self._tracking.notes, *cells)
+
+    @property
+    def broken(self) -> str:
+        """Why the robot cannot be controlled by its sensors, in words; "" as long as it can."""
+        return self._broken
 
     @property
     def footsteps(self) -> tuple[Footstep, ...]:
@@ -136,6 +162,8 @@ class Motion:
 
     def start_kick(self, goal: KickGoal) -> str:
         """Begin a kick; return "" or the reason why not."""
+        if self._stopped:
+            return self._stopped
         if self._kick is not None and not self._kick.finished:
             return "another kick is under way"
         if goal.kind is KickKind.WALKING:
@@ -188,6 +216,7 @@ class Motion:
     def tick(self, sensors: Sensors) -> JointCommand:
         """Return the command for the legs that answers one reading of the sensors."""
         self._stamp = sensors.stamp
+        self._broken = self._sensor_check.update(sensors)
         estimate = self._estimate = self._estimator.update(sensors, self._left_weight, self._tracking.com_acceleration)
         self._tilt.update(sensors, estimate.base_rotation, estimate.soles, estimate.loads, self._left_weight)
         self._track_ground(estimate, sensors)
@@ -259,6 +288,24 @@ class Motion:
             notes=self.notes,
         )
 
+    def whereabouts(self) -> Whereabouts:
+        """Return what `continue_from` takes, as of the last tick."""
+        x, y = self._ground.position
+        reckoning = self._dead_reckoning
+        return Whereabouts(
+            self._stamp,
+            (float(x), float(y)),
+            self._estimator.heading_offset,
+            reckoning.distance,
+            reckoning.uncertainty.ravel().tolist(),
+        )
+
+    def continue_from(self, before: Whereabouts, stamp: int) -> None:
+        """Go on at a stamp [ns] in the odom of motion control that has died; call before the first tick."""
+        gap = (stamp - before.stamp) * 1e-9
+        self._estimator.continue_from(before.heading_offset, (before.base[0], before.base[1]))
+        self._dead_reckoning.continue_from(before.distance, np.reshape(before.uncertainty, (4, 4)), gap)
+
     def save_learning(self) -> None:
         """Write what was learned since the last time to `learning_file`, if there is one."""
         self._tracking.save_learning()
@@ -313,23 +360,27 @@ class Motion:
         self._shift = (0.0, 0.0)
 
     def _start(self, estimate: Estimate) -> None:
-        """Begin to stand where the robot is."""
+        """Begin to stand where the robot is, if it stands: motion control may have been restarted during a fall."""
         self._tracking.reset(estimate)
         self._left_weight = 0.5
         self._dead_reckoning.begin(self._stamp, self._ground.position)
         self._started = True
+        p = self._parameters
+        if estimate.tilt > p.upright_tilt or _height(estimate) < p.upright_height:
+            self._fall(f"was found leaning by {math.degrees(estimate.tilt):.0f} deg, {_height(estimate):.2f} m high")
 
     def _change_mode(self, estimate: Estimate) -> None:
         """Go over to another mode if command or body ask for it.
 
-        A robot that lies, or is limp, stands again when it is upright and nobody wants it limp. Of one that is up, a
-        fall counts most, then limpness on request, then the end of a walk or kick, then the wish to walk.
+        A robot that lies, or is limp, stands again when it is upright, its sensors work and nobody wants it limp. Of
+        one that is up, broken sensors and a fall count most, then limpness on request, then the end of a walk or kick,
+        then the wish to walk.
         """
         p, wanted = self._parameters, self._command.mode
         if self._mode is MotionMode.FALLEN or self._mode is MotionMode.LIMP:
             if self._mode is MotionMode.LIMP and estimate.tilt > p.fall_tilt:
                 self._fall("fell while it was limp on request")
-            elif self._may_stand(estimate) and wanted is not WalkMode.LIMP:
+            elif not self._broken and self._may_stand(estimate) and wanted is not WalkMode.LIMP:
                 self._steps_before += self._steps_of_gait
                 self._move_feet_along()
                 self._estimator.restart()
@@ -338,10 +389,10 @@ class Motion:
         left, right = estimate.soles
         places = (left.position, right.position)
         fall = self._falls.is_falling(estimate.base_rotation, estimate.angular_velocity, estimate.dcm, places)
-        if fall:
-            self._fall(fall)
+        if self._broken or fall:
+            self._fall(self._broken or fall)
         elif wanted is WalkMode.LIMP:
-            self._mode, self._reason = MotionMode.LIMP, "limp on request"
+            self._mode, self._reason = MotionMode.LIMP, self._stopped or "limp on request"
         elif self._gait is not None and self._gait.finished:
             self._steps_before += self._steps_of_gait
             if isinstance(self._gait, Walking) and self._gait.kick is not None:
@@ -385,8 +436,9 @@ class Motion:
         p = self._parameters
         if self._mode is MotionMode.LIMP:
             return estimate.tilt < p.upright_tilt and min(estimate.loads) > p.contact_force
-        height = float(estimate.base_position[2]) - min(sole.position[2] for sole in estimate.soles)
-        return self._falls.is_upright(estimate.base_rotation, estimate.angular_velocity, height, estimate.loads)
+        return self._falls.is_upright(
+            estimate.base_rotation, estimate.angular_velocity, _height(estimate), estimate.loads
+        )
 
     def _advance_gait(self, estimate: Estimate) -> Reference:
         """Return what walk or kick want now, or standing where the feet are, and keep the feet that they put down."""
@@ -442,3 +494,8 @@ class Motion:
         return JointCommand(
             self._sequence, self._stamp, LEG_JOINTS, order.position, order.velocity, order.effort, *order.gains
         )
+
+
+def _height(estimate: Estimate) -> float:
+    """Return the height of base_link above the lower sole [m]."""
+    return float(estimate.base_position[2]) - min(sole.position[2] for sole in estimate.soles)

@@ -9,9 +9,10 @@ from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.task import Future
 
+from tulip_description.emergency_stop import StopWord
 from tulip_description.robot import load_robot
 from tulip_motion.footsteps import Footstep
-from tulip_motion.interface import KickGoal, KickKind, MotionMode, Side, WalkCommand, WalkMode
+from tulip_motion.interface import KickGoal, KickKind, MotionMode, Side, WalkCommand, WalkMode, Whereabouts
 from tulip_motion.messages import (
     body_transforms,
     footsteps_to_message,
@@ -27,6 +28,7 @@ from tulip_motion.saturation import Saturation
 from tulip_msgs.action import Kick
 from tulip_msgs.msg import WalkCommand as WalkCommandMessage
 from tulip_ros import topics
+from tulip_ros.emergency_stop import StopLink
 from tulip_ros.errors import BadInputError
 from tulip_ros.finding import Finding, Level
 from tulip_ros.matching import SameStamp
@@ -51,6 +53,9 @@ class MotionNode(ComponentNode):
         super().__init__("motion")
         self._settings = self.load(MotionParameters())
         self._kick: _RunningKick | None = None
+        kept = self.keepsake.read()
+        self._before = Whereabouts(**kept) if kept else None
+        self._emergency_stop = StopLink(self, "motion", self._on_emergency_stop)
         try:
             self._begin()
         except ValueError as error:  # a number that does not fit this robot's legs
@@ -91,6 +96,8 @@ class MotionNode(ComponentNode):
         self._sensors = SameStamp("joint_states", "imu", "foot_forces")
         self._tick = 0
         self._walking_until = 0
+        if self._emergency_stop.engaged:  # that time began anew is no release
+            self._on_emergency_stop(self._emergency_stop.word)
 
     def destroy_node(self) -> None:
         """Keep what was learned, and end."""
@@ -107,6 +114,10 @@ class MotionNode(ComponentNode):
         except ValueError as error:
             self.health.count("refused sensors", str(error))
             return
+        if self._before is not None:  # motion control has died, and goes on in its odom, unless time began anew
+            if sensors.stamp >= self._before.stamp:
+                self._motion.continue_from(self._before, sensors.stamp)
+            self._before = None
         if self._walking_until and sensors.stamp > self._walking_until:
             self.health.count("walk command too old", "strategy is silent: the robot stops walking")
             self._motion.command(WalkCommand(sensors.stamp, WalkMode.STAND))
@@ -123,6 +134,7 @@ class MotionNode(ComponentNode):
         self._odometry.publish(odometry_to_message(odometry))
         self._tf.publish(body_transforms(odometry))
         self._state.publish(motion_state_to_message(state, odometry.distance))
+        self.keepsake.keep(self._motion.whereabouts()._asdict())
         footsteps = self._motion.footsteps
         if footsteps != self._footsteps_told:
             self._footsteps_told = footsteps
@@ -155,6 +167,8 @@ class MotionNode(ComponentNode):
 
     def _motion_health(self) -> Finding | None:
         """Tell what motion control notes for as long as it lasts, as a clipped walk command."""
+        if self._motion.broken:
+            return Finding(Level.ERROR, f"{self._motion.broken}: have it mended, then start this node again")
         return Finding(Level.WARNING, "; ".join(self._notes.values())) if self._notes else None
 
     def _on_cancel(self, handle: ServerGoalHandle) -> CancelResponse:
@@ -173,6 +187,12 @@ class MotionNode(ComponentNode):
             self.health.count("refused walk command", f"walk command refused: {error}")
             return
         self._walking_until = command.stamp + COMMAND_LIFE if command.mode is WalkMode.WALK else 0
+
+    def _on_emergency_stop(self, word: StopWord) -> None:
+        if word.engaged:
+            self._motion.stop(str(word))
+        else:
+            self._motion.release()
 
     async def _execute_kick(self, handle: ServerGoalHandle) -> Kick.Result:
         """Kick, or refuse: a goal is always accepted first, since only a result can carry the reason."""

@@ -29,6 +29,8 @@ class MovingTarget:
         self._stamp = 0  # [ns]
         self._place: Array | None = None
         self._velocities: deque[Array] = deque(maxlen=3)
+        self.velocity = np.zeros(3)
+        """(3,) [m/s]; zero until three differences are known, and for jumps that no ball makes."""
 
     def see(self, stamp: int, place: tuple[float, float, float]) -> None:
         """Take a place [m] at a stamp [ns]; the one known already, or an older one, changes nothing."""
@@ -39,26 +41,23 @@ class MovingTarget:
         gap = (stamp - self._stamp) * 1e-9
         if gap <= 0.0:
             if gap < -self._longest_gap:  # time began anew
-                self._velocities.clear()
+                self._forget()
             elif gap < 0.0 or np.array_equal(here, self._place):
                 return
             self._stamp, self._place = stamp, here
             return
         if gap > self._longest_gap:
-            self._velocities.clear()
+            self._forget()
         else:
             self._velocities.append((here - self._place) / gap)
+            if len(self._velocities) == 3:
+                median: Array = np.sort(np.array(self._velocities), axis=0)[1]
+                self.velocity = median if float(np.linalg.norm(median)) <= self._greatest_speed else np.zeros(3)
         self._stamp, self._place = stamp, here
 
-    @property
-    def velocity(self) -> Array:
-        """(3,) [m/s]; zero until three differences are known, and for jumps that no ball makes."""
-        if len(self._velocities) < 3:
-            return np.zeros(3)
-        velocity: Array = np.median(np.array(self._velocities), axis=0)
-        if float(np.linalg.norm(velocity)) > self._greatest_speed:
-            return np.zeros(3)
-        return velocity
+    def _forget(self) -> None:
+        self._velocities.clear()
+        self.velocity = np.zeros(3)
 
     def at(self, stamp: int) -> tuple[float, float, float]:
         """Return where the target is at a stamp [ns], carried on from its last place by `longest_gap` at most.

@@ -65,6 +65,23 @@ class DeadReckoning:
         if self._stamp is None:
             self._stamp, self._position = stamp, position
 
+    @property
+    def uncertainty(self) -> Array:
+        """(4, 4) covariance of x, y [m], yaw [rad] and its drift [rad/s] at the last step or start."""
+        return self._covariance.copy()
+
+    def continue_from(self, distance: float, uncertainty: Array, gap: float) -> None:
+        """Go on from what another one has counted. In the meantime the robot may have walked, or fallen.
+
+        Args:
+            distance: Path length walked [m].
+            uncertainty: (4, 4) of the other one.
+            gap: Time since then [s].
+        """
+        p = self._parameters
+        self.distance, self._covariance = distance, uncertainty.copy()
+        self._covariance[:2, :2] += min(p.max_speed_forward * gap, p.odometry_fall_spread) ** 2 * np.eye(2)
+
     def step(
         self, stamp: int, position: Point, before: Sequence[Pose2D], after: Sequence[Pose2D], signs: SlipSigns
     ) -> None:

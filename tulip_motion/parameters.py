@@ -220,6 +220,12 @@ class MotionParameters:
     fall_reach_side: float = 0.475  # [m] a step of 0.42 m sideways and the edge of the sole
     fall_confirm_time: float = 0.02  # [s] a sign has to last; impacts ring for less
     upright_tilt: float = 0.25  # [rad] below it, now and after fall_horizon, a limp robot may stand up again
+    # Broken sensors, which it goes limp for; see sensor_check.py
+    encoder_check_limit: float = 0.1  # [rad] that a motor turns while its joint's angle is read the same
+    imu_check_time: float = 0.04  # [s] of the same reading; even an IMU of 50 Hz has two different ones in it
+    cell_check_time: float = (
+        2.0  # [s] of readings of nothing while the foot carries the robot; it walks on all the same
+    )
     upright_height: float = 0.9  # [m] of base_link above the soles; from lower down a robot that fell does not get up
 
     def __post_init__(self) -> None:

@@ -118,6 +118,7 @@ class StateEstimator:
         soles = [data.oMf[frame] for frame in self._sole_frames]
         self._soles = tuple((sole.translation, sole.rotation) for sole in soles)
         self._heading_offset: Quaternion | None = None
+        self._comes_from: Point2D | None = None  # [m] where base_link is at the first update, if that is known
         self._tilt_bias = (0.0, 0.0)  # [rad] of the IMU about the x and y axis of base_link
         self._begins = True
         dt, position_share = parameters.control_period, parameters.control_period * parameters.observer_position_gain
@@ -141,6 +142,21 @@ class StateEstimator:
     def anchor(self, foot: Footstep) -> None:
         """Take a foot to be fixed on the ground at its pose from now on."""
         self.anchors[foot.side] = foot.pose
+
+    @property
+    def heading_offset(self) -> float:
+        """Heading of base_link in odom less that of the IMU [rad]; 0 before the first update."""
+        return 0.0 if self._heading_offset is None else quaternion_yaw(self._heading_offset)
+
+    def continue_from(self, heading_offset: float, base: Point2D) -> None:
+        """Go on in another estimator's odom; call before the first update.
+
+        Args:
+            heading_offset: Of the other one [rad].
+            base: Where it had base_link, seen from above [m].
+        """
+        half = 0.5 * heading_offset
+        self._heading_offset, self._comes_from = (0.0, 0.0, math.sin(half), math.cos(half)), base
 
     def restart(self) -> None:
         """Forget the CoM's motion; the next update begins with the feet where they are measured."""
@@ -270,7 +286,10 @@ class StateEstimator:
     def _begin(self, left: Pose2D, right: Pose2D) -> None:
         """Set the anchors such that the left foot stays where it was believed to be, the right beside it."""
         keep = self.anchors[Side.LEFT]
-        if keep == Pose2D():
+        if self._comes_from is not None:
+            (x, y), self._comes_from = self._comes_from, None
+            keep = Pose2D(x + left.x, y + left.y)
+        elif keep == Pose2D():
             keep = left
         self.anchors = [Pose2D(keep.x, keep.y, left.yaw), keep_distance(keep, left, right)]
 

@@ -10,6 +10,9 @@ from pathlib import Path
 EXIT_BAD_INPUT = 2
 """Exit code of a program that was given something it cannot use."""
 
+EXIT_GIVEN_UP = 3
+"""Exit code of a launch in which a node died so often that it was not started any more."""
+
 MOST_NAMES = 12
 """More known names than this are not listed when one of them was probably meant."""
 

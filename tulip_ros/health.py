@@ -15,10 +15,11 @@ from rclpy.node import Node
 
 from tulip_ros import topics
 from tulip_ros.finding import Finding, Level, say, worst
-from tulip_ros.launch import RESTARTS_VARIABLE
+from tulip_ros.heartbeat import beat
+from tulip_ros.node_process import RESTARTS_VARIABLE
 from tulip_ros.time import to_message
 from tulip_ros.topics import Topic
-from tulip_ros.watches import HOLD, InputWatch, TimeWatch
+from tulip_ros.watches import HOLD, InputWatch, StallWatch, TimeWatch
 
 LOOK = 0.2  # [s] of wall-clock time between two looks: a stalled simulation must still show
 LOG_PERIOD = 1.0  # [s] between two lines of the log about the same event
@@ -52,6 +53,7 @@ class Health:
         self._last = monotonic()
         self._processor_time = process_time()
         self._time = TimeWatch(self._last)
+        self._stalls = StallWatch(self._last)
         self._timer = node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def expect(self, topic: Topic) -> InputWatch:
@@ -97,13 +99,16 @@ class Health:
     def _look(self) -> None:
         now = monotonic()
         self._looks += 1
-        due = self._looks % LOOKS == 0
+        due = self._looks % LOOKS == 1  # the first one, too: it tells that the node is there
+        deaf = self._stalls.look(now, sum(watch.count for watch in self._inputs.values() if watch.regular))
+        if due and deaf is None:
+            beat()  # who hears nobody gives no sign of life, so that the launcher starts it again
         if due:
             asked = [check() for check in self._checks] + [watch.tally() for watch in self._inputs.values()]
             self._found = [finding for finding in asked if finding is not None]
         time = self._node.get_clock().now().nanoseconds
         watched = [self._time.look(now, time), *(watch.look(now, time) for watch in self._inputs.values())]
-        findings = self._found + [finding for finding in watched if finding is not None]
+        findings = self._found + [finding for finding in (deaf, *watched) if finding is not None]
         if self._warning and now - self._warned_at < HOLD:
             findings.append(Finding(Level.WARNING, self._warning))
         level = worst(findings)

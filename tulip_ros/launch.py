@@ -1,54 +1,34 @@
-"""Starts nodes, each a process; restarts one that died; ends all of them cleanly."""
+"""Starts nodes, each a process; restarts one that died or hangs; ends all of them cleanly, the robot's body first.
+
+A node that dies is started again: at once the first time, then after pauses that double. One that dies again and again
+is given up, and the robot is brought to stand still (see `tulip_ros.safe_state`). One that gives no sign of life while
+others do is killed, and started again.
+"""
 
 from __future__ import annotations
 
-import ctypes
-import os
 import signal
 import subprocess
+import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from time import monotonic, sleep
+from threading import Thread
+from time import monotonic
 from types import TracebackType
 
 from tulip_ros import transport
-from tulip_ros.errors import EXIT_BAD_INPUT, BadInputError
+from tulip_ros.ending import end_in_order
+from tulip_ros.errors import BadInputError
+from tulip_ros.node_process import NodeProcess, ProcessState, Standby, needed
+from tulip_ros.nodes import DRIVER
 from tulip_ros.plan import Start
 
-FIRST_PAUSE, LONGEST_PAUSE = 0.2, 10.0  # [s] before a restart; doubles with each death in a row
-SETTLED = 20.0  # [s] of life after which earlier deaths are forgotten
-DEATHS = 6  # in a row, after which a node is given up
-PATIENCE = 5.0  # [s] to end by itself after SIGTERM, before SIGKILL
-RESTARTS_VARIABLE = "TULIP_RESTARTS"
-"""Environment variable that tells a node how many times it was started again."""
-DIES_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl(2)
-TAIL = 15  # lines of a dead node's log in messages
-
-
-@dataclass(frozen=True)
-class ProcessState:
-    """How one node's process is.
-
-    Attributes:
-        name: Name of the node.
-        state: "running", "waiting" (for its restart), "given up" or "ended".
-        pid: Process id, or 0.
-        restarts: How many times it was started again.
-        uptime: Since its last start [s], or 0.
-        exit_code: Of its last end (minus the signal's number), or None.
-        namespace: As in "striker", or "".
-    """
-
-    name: str
-    state: str
-    pid: int
-    restarts: int
-    uptime: float
-    exit_code: int | None
-    namespace: str = ""
+HUNG = 10.0  # [s] without a sign of life, of which one comes each second: no callback of a node takes a tenth of that
+LIVELY = 3.0  # [s] since the last sign of some other node: else it is the machine that stands still, not the node
+ABSENT = 2.0  # [s] between two polls after which the launcher itself was held up, and begins to watch anew
+BUSY = 10.0  # [s] since the first start, in which the processor has better to do than to have a process wait
+CALM = 5.0  # [s] since the last start, after which there is time to tidy up
 
 
 class Launcher:
@@ -60,13 +40,16 @@ class Launcher:
         ...         launcher.poll()
     """
 
-    def __init__(self, plan: Sequence[Start], log_folder: Path | None = None, transport_name: str = "auto") -> None:
+    def __init__(
+        self, plan: Sequence[Start], log_folder: Path | None = None, transport_name: str = "auto", hung: float = HUNG
+    ) -> None:
         """Prepare; nothing is started yet.
 
         Args:
             plan: Nodes to start, in order.
             log_folder: Gets one log file a node; a new temporary folder by default.
             transport_name: "auto", "shared_memory" or "udp".
+            hung: A node without a sign of life for so long is killed and started again [s]; 0 for never.
 
         Raises:
             BadInputError: if the log folder cannot be written.
@@ -78,8 +61,17 @@ class Launcher:
         except OSError as error:
             raise BadInputError(f"Log folder {log_folder} cannot be made: {error.strerror}.") from error
         self.log_folder = log_folder
-        self._transport = transport_name
-        self._processes = [_Process(start, log_folder) for start in plan]
+        self._transport, self._hung = transport_name, hung
+        # By being imported, a node of this project does nothing; of others one cannot know.
+        modules = [each.entry.module for each in reversed(plan) if needed(each.entry)]
+        modules = [name for name in dict.fromkeys(modules) if name.startswith("tulip_")]
+        self._standby = Standby(modules, log_folder / "standby.log") if modules else None
+        self._processes = [NodeProcess(start, log_folder, self._standby) for start in plan]
+        self._requests: dict[tuple[str, str], subprocess.Popen[bytes]] = {}  # by namespace and wish, see safe_state
+        self._tidying: Thread | None = None
+        self._untidy = False
+        self._killed = ("", 0)  # name of the process that was killed last since it hung, and which of its lives
+        self._first_start = self._last_start = self._last_poll = self._watching_since = 0.0
 
     def __enter__(self) -> Launcher:
         transport.remove_leftovers()
@@ -90,6 +82,7 @@ class Launcher:
         except BaseException:
             self.stop()
             raise
+        self._first_start = self._last_start = self._last_poll = self._watching_since = monotonic()
         return self
 
     def __exit__(
@@ -97,139 +90,119 @@ class Launcher:
     ) -> None:
         self.stop()
 
+    @property
+    def given_up(self) -> tuple[str, ...]:
+        """Names of the nodes that died again and again, and are not started any more."""
+        return tuple(process.name for process in self._processes if process.given_up)
+
     def poll(self) -> list[str]:
         """Look after the processes and return what happened, one line each. Call it several times a second.
 
         Raises:
             BadInputError: if a node refused what it was given; it would do so again.
         """
-        return [line for process in self._processes for line in process.poll()]
+        now = monotonic()
+        if now - self._last_poll > ABSENT:
+            self._watching_since = now
+        self._last_poll = now
+        said = []
+        for process in self._processes:
+            gone, before = process.given_up, process.starts
+            said += process.poll()
+            if process.starts != before:
+                self._last_start, self._untidy = now, True
+            if process.given_up and not gone and process.plays:
+                said += self._stand_still(process)
+        said += self._kill_hung(now)
+        said += self._heed_answers()
+        if self._standby is not None and now - self._first_start > BUSY:
+            if all(each.last_beat for each in self._processes if each.plays):
+                self._standby.start()  # not before: nodes that start need the processor more
+        if self._untidy and now - self._last_start > CALM:
+            self._tidy_up()
+        return said
 
     def states(self) -> tuple[ProcessState, ...]:
         """Return how each process is, in the order of the plan."""
         return tuple(process.state() for process in self._processes)
 
     def stop(self) -> None:
-        """End all processes: the recorder last, so that it sees the others end. Leave nothing of theirs behind."""
-        recorders = [process for process in self._processes if process.is_recorder]
-        _end([process for process in self._processes if process not in recorders])
-        _end(recorders)
+        """End all processes: the body's driver first, the recorder last. Leave nothing of theirs behind."""
+        drivers = [process for process in self._processes if process.entry.name == DRIVER]
+        recorders = [process for process in self._processes if process.entry.name == "recorder"]
+        others = [process for process in self._processes if process not in (*drivers, *recorders)]
+        end_in_order(drivers, others, recorders)
+        for request in self._requests.values():
+            request.kill()
+            request.wait()
+        if self._standby is not None:
+            self._standby.end()
+        if self._tidying is not None:
+            self._tidying.join()
         # Not only after a kill: now and then Fast DDS leaves a port behind of nodes that end at the same time.
         transport.remove_leftovers()
 
+    def _kill_hung(self, now: float) -> list[str]:
+        """Kill nodes that give no sign of life while others do."""
+        beats = {process: beat for process in self._processes if (beat := process.last_beat) is not None}
+        said = []
+        for process, beat in beats.items():
+            silent = now - max(beat, self._watching_since)
+            others = [now - other for each, other in beats.items() if each is not process]
+            life = (process.name, process.starts)
+            if self._hung and silent > self._hung and life != self._killed and (not others or min(others) < LIVELY):
+                process.signal(signal.SIGKILL)
+                self._killed = life  # it takes a moment to die
+                said.append(f"{process.name} gives no sign of life for {silent:.0f} s, and is killed")
+        return said
 
-class _Process:
-    def __init__(self, start: Start, log_folder: Path) -> None:
-        self.name, self._start = start.full_name, start
-        file = self.name.replace("/", ".")
-        self._log = log_folder / f"{file}.log"
-        self._command = start.command(log_folder / f"{file}.yaml")
-        self._process: subprocess.Popen[bytes] | None = None
-        self._started = 0.0
-        self._restart_at = 0.0
-        self._starts = 0
-        self._deaths = 0
-        self._given_up = False
-        self._ended = False
-        self._exit_code: int | None = None
+    def _stand_still(self, process: NodeProcess) -> list[str]:
+        """Bring a robot without one of its nodes to stand still."""
+        said = [f"{process.name} is missing: the robot of {process.namespace or 'this graph'} must not play on"]
+        if process.entry.name == "motion":
+            self._tell(process.namespace, "limp")
+            return [*said, "without motion control the robot is limp"]
+        if not any(each.entry.name == "user_input" and not each.given_up for each in self._robot(process.namespace)):
+            return said + self._end_strategy(process.namespace)
+        self._tell(process.namespace, "stand")
+        return said
 
-    @property
-    def is_recorder(self) -> bool:
-        return self._start.name == "recorder"
+    def _tell(self, namespace: str, wish: str) -> None:
+        """Have a robot told what to do, beside the work."""
+        if (namespace, wish) not in self._requests:
+            command = [sys.executable, "-m", "tulip_ros.safe_state", namespace, wish]
+            with open(self.log_folder / "safe_state.log", "ab") as log:
+                self._requests[namespace, wish] = subprocess.Popen(
+                    command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
+                )
 
-    def start(self) -> None:
-        with open(self._log, "ab") as log:
-            self._process = subprocess.Popen(
-                self._command,
-                env={
-                    "ROS_LOG_DIR": str(self._log.parent),
-                    **os.environ,
-                    "PYTHONUNBUFFERED": "1",
-                    RESTARTS_VARIABLE: str(self._starts),
-                },
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,  # Ctrl-C reaches the launcher alone, which ends the nodes in order
-                preexec_fn=partial(_die_with_parent, os.getpid()),
-            )
-        self._started = monotonic()
-        self._starts += 1
+    def _heed_answers(self) -> list[str]:
+        """Take the answers to what `_stand_still` asked for."""
+        said = []
+        for (namespace, wish), request in list(self._requests.items()):
+            code = request.poll()
+            if code is None:
+                continue
+            del self._requests[namespace, wish]
+            if code == 0:
+                said.append("the robot was told to stand" if wish == "stand" else "the emergency stop holds")
+            elif wish == "stand":
+                said += self._end_strategy(namespace)
+        return said
 
-    def poll(self) -> list[str]:
-        now = monotonic()
-        if self._process is None:
-            if self._given_up or now < self._restart_at:
-                return []
-            self.start()
-            assert self._process is not None
-            return [f"{self.name} started again (process {self._process.pid})"]
-        code = self._process.poll()
-        if code is None:
-            return []
-        self._process, self._exit_code = None, code
-        if code == EXIT_BAD_INPUT:
-            self._given_up = True
-            raise BadInputError(f"Node {self.name} refused what it was given: {self._refusal()}")
-        self._deaths = 1 if now - self._started > SETTLED else self._deaths + 1
-        if self._deaths >= DEATHS:
-            self._given_up = True
-            return [
-                f"{self.name} died {DEATHS} times in a row and is given up; the end of {self._log}:\n{self._tail()}"
-            ]
-        pause = min(FIRST_PAUSE * 2 ** (self._deaths - 1), LONGEST_PAUSE)
-        self._restart_at = now + pause
-        how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
-        return [f"{self.name} {how}; starting it again in {pause:.1f} s (log: {self._log})"]
+    def _end_strategy(self, namespace: str) -> list[str]:
+        """End who tells motion control to walk; it stops by itself then."""
+        robot = self._robot(namespace)
+        strategies = [process for process in robot if process.entry.name == "strategy" and not process.has_ended()]
+        end_in_order((), strategies, ())
+        return [f"{process.name} was ended: motion control stops walking and stands" for process in strategies]
 
-    def state(self) -> ProcessState:
-        alive = self._process is not None
-        words = "running" if alive else "ended" if self._ended else "given up" if self._given_up else "waiting"
-        return ProcessState(
-            self._start.name,
-            words,
-            self._process.pid if self._process else 0,
-            max(self._starts - 1, 0),
-            monotonic() - self._started if alive else 0.0,
-            self._exit_code,
-            self._start.namespace,
-        )
+    def _robot(self, namespace: str) -> list[NodeProcess]:
+        return [process for process in self._processes if process.namespace == namespace]
 
-    def signal(self, number: signal.Signals) -> None:
-        if self._process is not None and self._process.poll() is None:
-            self._process.send_signal(number)
-
-    def has_ended(self) -> bool:
-        return self._process is None or self._process.poll() is not None
-
-    def forget(self) -> None:
-        if self._process is not None:
-            self._exit_code = self._process.wait()
-        self._process, self._ended = None, True
-
-    def _refusal(self) -> str:
-        """Return the node's own words: what follows "error: " in its log."""
-        _, mark, words = self._log.read_text(errors="replace").rpartition("error: ")
-        return words.strip() if mark else f"the end of its log:\n{self._tail()}"
-
-    def _tail(self) -> str:
-        lines = self._log.read_text(errors="replace").splitlines()
-        return "\n".join(f"  {line}" for line in lines[-TAIL:])
-
-
-def _end(processes: Sequence[_Process]) -> None:
-    for process in processes:
-        process.signal(signal.SIGTERM)
-    deadline = monotonic() + PATIENCE
-    while monotonic() < deadline and not all(process.has_ended() for process in processes):
-        sleep(0.02)
-    for process in processes:
-        process.signal(signal.SIGKILL)
-        process.forget()
-
-
-def _die_with_parent(parent: int) -> None:
-    """In the child: ask to be ended when the launcher is killed, so that no node stays behind."""
-    ctypes.CDLL(None).prctl(DIES_WITH_PARENT, signal.SIGTERM)
-    if os.getppid() != parent:  # it died before this line
-        os._exit(1)
+    def _tidy_up(self) -> None:
+        """Remove the shared memory of nodes that were killed, beside the work."""
+        if self._tidying is None or not self._tidying.is_alive():
+            self._tidying = Thread(target=transport.remove_leftovers)
+            self._tidying.start()
+            self._untidy = False

@@ -6,10 +6,13 @@ import heapq
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 from tulip_ros.bag import FREE, Bag
 from tulip_ros.errors import BadInputError
+from tulip_ros.latched import latched_before
 from tulip_ros.log_file import Log, LoggedTopic, Record
 
 Advance = Callable[[int], None]
@@ -21,6 +24,8 @@ OLD = ".old"
 
 def cut(log: Log, names: Sequence[str], start: int | None, end: int | None, folder: Path, advance: Advance) -> int:
     """Write a part of a recording into a new one, with all its notes and attachments.
+
+    What was latched before the part stands at its beginning: whoever reads it wants the camera's lens, and the game.
 
     Args:
         log: To read.
@@ -38,7 +43,10 @@ def cut(log: Log, names: Sequence[str], start: int | None, end: int | None, fold
     """
     with writing(folder) as bag:
         bag.copy_notes(log)
-        return _write(bag, log.records(names, start, end), advance)
+        before = []
+        if start is not None:
+            before = [replace(record, log_time=start) for record in latched_before(log, names, start)]
+        return _write(bag, chain(before, log.records(names, start, end)), advance)
 
 
 def merge(logs: Sequence[Log], folder: Path, advance: Advance) -> int:

@@ -15,7 +15,7 @@ from rich.table import Table
 from tulip_ros import topics
 from tulip_ros.aggregation import NOT_HEARD, Aggregation, Report, by_topic
 from tulip_ros.finding import Level
-from tulip_ros.launch import ProcessState
+from tulip_ros.node_process import ProcessState
 from tulip_ros.nodes import DRIVER, ROBOT
 
 PERIOD = 1.0  # [s] of wall-clock time between two sums, as between two reports of a node

@@ -55,6 +55,7 @@ NODES: dict[str, NodeEntry] = {
         NodeEntry("game_input", "tulip_strategy.game_input_node"),
         NodeEntry("user_input", "tulip_strategy.user_input_node"),
         NodeEntry("emulator", "tulip_sim.emulator_node", playing=False),
+        NodeEntry("disturber", "tulip_sim.disturber_node", playing=False),
         NodeEntry("perception", "tulip_sim.perception_node", playing=False),
         NodeEntry("identify", "tulip_motion.identification.identify_node", playing=False),
         NodeEntry(AGGREGATOR, "tulip_ros.aggregator_node", playing=False),
@@ -78,6 +79,7 @@ def driver_of(body: str, *parameters: tuple[str, str]) -> NodeEntry:
 
 DRIVERS: dict[str, NodeEntry] = {
     "sim": NodeEntry(DRIVER, "tulip_sim.driver_node", playing=False),
+    "mujoco": NodeEntry(DRIVER, "tulip_sim.driver_node", playing=False, parameters=(("world.engine", "mujoco"),)),
     "match": NodeEntry(DRIVER, "tulip_sim.match_driver_node", playing=False),
     "log": NodeEntry(DRIVER, "tulip_sim.log_driver_node", playing=False),
     "echo": driver_of("tulip_driver.echo:EchoBody"),
@@ -87,6 +89,10 @@ DRIVERS: dict[str, NodeEntry] = {
 
 ROBOT: tuple[str, ...] = tuple(name for name, entry in NODES.items() if entry.playing)
 """The nodes that make the robot play, in the order of the data flow."""
+
+
+LOOKERS = frozenset({AGGREGATOR, "markers", "recorder", "view", "bridge"})
+"""The nodes that only look at a robot: alone they want no driver, as the robot's may run on another computer."""
 
 
 def find_node(name: str) -> NodeEntry:

@@ -19,7 +19,7 @@ from tulip_ros.nodes import DRIVERS, NODES, ROBOT, NodeEntry, find_driver, find_
 Values = Mapping[str, Any]
 EVERY_NODE = "/**"
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*")
-SIMULATED = frozenset({"sim", "match", "log", "wire"})
+SIMULATED = frozenset({"sim", "mujoco", "match", "log", "wire"})
 """Drivers that publish /clock, which the other nodes follow then."""
 
 
@@ -32,12 +32,14 @@ class Start:
         entry: Which program it is.
         parameters: Values that differ from those in the code, nested as in YAML.
         namespace: As in "striker", or "".
+        renamed: Topics that this node knows by another name: its own name for it, and the name in the graph.
     """
 
     name: str
     entry: NodeEntry
     parameters: Values
     namespace: str
+    renamed: tuple[tuple[str, str], ...] = ()
 
     @property
     def full_name(self) -> str:
@@ -48,7 +50,11 @@ class Start:
         """Write the parameters to a file and return the command line that uses it."""
         parameter_file.write_text(yaml.safe_dump({EVERY_NODE: {"ros__parameters": dict(self.parameters)}}))
         command = [sys.executable, "-m", self.entry.module, "--ros-args", "--params-file", str(parameter_file)]
-        return [*command, "-r", f"__ns:=/{self.namespace}"] if self.namespace else command
+        if self.namespace:
+            command += ["-r", f"__ns:=/{self.namespace}"]
+        for own, name in self.renamed:
+            command += ["-r", f"{own}:={name}"]
+        return command
 
 
 def make_plan(

@@ -329,7 +329,7 @@ def _copy_chunk(source: _Source, found: Found, file: McapFile) -> None:
         for channel, sequence in numbers:
             source.see(channel, sequence)
         held = bytes(source.data[head.data : head.data + head.length])
-        file.add_compressed(held, head.compression, head.span, head.size, head.checksum, indices)
+        file.add_compressed([held], head.compression, head.span, head.size, head.checksum, indices)
         return
     chunk = Chunk()
     _take(source, content, chunk)

@@ -8,14 +8,11 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 from tulip_ros import schemas, topics
-from tulip_ros.bag_metadata import profiles_of
 from tulip_ros.errors import BadInputError
-from tulip_ros.log_file import Log, LoggedTopic, Record
-from tulip_ros.topics import Quality
+from tulip_ros.latched import latched_before
+from tulip_ros.log_file import Log, Record
 
 CLOCK_PERIOD = 20_000_000  # [ns] of recorded time between two messages on /clock: 50 Hz, as simulators have it
-DEEPEST = 1000  # messages that a sender keeps; a recording that asks for more is not obeyed
-SPARE = Quality(depth=50)  # of topics that this project does not know and whose recorder did not note it
 
 
 @dataclass(frozen=True)
@@ -168,11 +165,7 @@ class Passage:
 
     def before(self) -> list[Record]:
         """Return the last message before the beginning of each topic that keeps its last one for late listeners."""
-        latched = [name for name in self.names if quality_of(self._log.topics[name]).latched]
-        newest = (
-            {record.topic.name: record for record in self._log.records(latched, None, self.first)} if latched else {}
-        )
-        return list(newest.values())
+        return latched_before(self._log, self.names, self.first)
 
 
 def playable(log: Log) -> tuple[list[str], dict[str, str]]:
@@ -190,17 +183,3 @@ def playable(log: Log) -> tuple[list[str], dict[str, str]]:
         else:
             names.append(name)
     return names, refused
-
-
-def quality_of(topic: LoggedTopic) -> Quality:
-    """Return the quality of service of a recorded topic: as noted, else as this project has it."""
-    for known in topics.TOPICS:
-        if topic.name.endswith(f"/{known.name.lstrip('/')}") and topic.type_name == known.type_name:
-            return known.quality
-    profiles = profiles_of(topic.quality)
-    try:
-        latched = bool(profiles) and all(each["durability"] in ("transient_local", 1) for each in profiles)
-        depth = max((int(each["depth"]) for each in profiles), default=0)
-    except (KeyError, TypeError, ValueError, OverflowError):
-        return SPARE
-    return Quality(depth if 0 < depth <= DEEPEST else SPARE.depth, latched)

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from tulip_ros import schemas
 from tulip_ros.errors import BadInputError
+from tulip_ros.latched import quality_of
 from tulip_ros.log_file import Log, Record
 from tulip_ros.player import Handler, Player
-from tulip_ros.replay import ReplayParameters, playable, quality_of
+from tulip_ros.replay import ReplayParameters, playable
 from tulip_ros.run import ComponentNode, run
 
 

@@ -27,6 +27,7 @@ from tulip_msgs.action import Kick
 from tulip_msgs.msg import (
     BehaviourTree,
     Decision,
+    EmergencyStop,
     Features,
     FootForces,
     GameState,
@@ -53,12 +54,17 @@ class Quality:
     depth: int
     latched: bool = False
 
-    def profile(self) -> QoSProfile:
-        """Return the profile for rclpy: always reliable, keep last."""
+    @property
+    def on_looking(self) -> ReliabilityPolicy:
+        """For who only looks: no publisher repeats a message for it. Latched ones reach reliable listeners alone."""
+        return ReliabilityPolicy.RELIABLE if self.latched else ReliabilityPolicy.BEST_EFFORT
+
+    def profile(self, reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE) -> QoSProfile:
+        """Return the profile for rclpy: keep last, and reliable unless asked otherwise."""
         return QoSProfile(
             history=HistoryPolicy.KEEP_LAST,
             depth=self.depth,
-            reliability=ReliabilityPolicy.RELIABLE,
+            reliability=reliability,
             durability=DurabilityPolicy.TRANSIENT_LOCAL if self.latched else DurabilityPolicy.VOLATILE,
         )
 
@@ -111,7 +117,12 @@ class Topic:
         return node.create_publisher(self.message, self.name, self.quality.profile())
 
     def subscribe_from(
-        self, node: Node, callback: Callable[[Any], None], raw: bool = False, depth: int | None = None
+        self,
+        node: Node,
+        callback: Callable[[Any], None],
+        raw: bool = False,
+        depth: int | None = None,
+        only_looks: bool = False,
     ) -> Subscription:
         """Create a subscription to this topic in a node.
 
@@ -120,9 +131,11 @@ class Topic:
             callback: Is given each message.
             raw: Give the callback the serialized message (bytes) instead.
             depth: How many messages wait for this listener; as many as for any other by default.
+            only_looks: The listener rather misses a message than has its sender repeat it.
         """
         quality = self.quality if depth is None else replace(self.quality, depth=depth)
-        return node.create_subscription(self.message, self.name, callback, quality.profile(), raw=raw)
+        profile = quality.profile(quality.on_looking) if only_looks else quality.profile()
+        return node.create_subscription(self.message, self.name, callback, profile, raw=raw)
 
 
 @dataclass(frozen=True)
@@ -147,6 +160,8 @@ def type_name(interface: type[Any]) -> str:
 
 
 ALL_NODES = ("driver", "vision", "worldmodel", "head", "motion", "strategy", "game_input", "user_input")
+OBEYING = ("driver", "head", "motion", "strategy", "user_input", "identify")
+"""Nodes that obey the emergency stop: all that move the robot or decide what it does."""
 
 CAMERA_IMAGE = Topic(
     "camera/image_raw",
@@ -263,6 +278,15 @@ ROBOT_POSE = Topic(
     "robot_pose", PoseWithCovarianceStamped, STATE, ("worldmodel",), (), "base_footprint in map, for standard viewers"
 )
 TF = Topic("tf", TFMessage, EVENTS, ("worldmodel", "motion"), (), "map to odom; odom to base_footprint to base_link")
+EMERGENCY_STOP = Topic(
+    "emergency_stop",
+    EmergencyStop,
+    LATCHED,
+    OBEYING,
+    OBEYING,
+    "whether the emergency stop holds: anybody may engage it, it ends by `release_emergency_stop` alone; all who obey"
+    " repeat the newest word",
+)
 USER_WISH = Topic(
     "user_wish",
     UserCommand,
@@ -272,6 +296,14 @@ USER_WISH = Topic(
     "what a person wants, from viewers that publish; checked as set_user_command, stamp and sequence are not read",
 )
 GAME_STATE = Topic("game_state", GameState, LATCHED, ("game_input",), ("strategy",), "the referee's view of the game")
+USER_PRESENT = Topic(
+    "user_present",
+    String,
+    CONTROL,
+    (),
+    ("user_input",),
+    "a face says four times a second that whoever began the walk test by it is there: without that it ends",
+)
 USER_COMMAND = Topic(
     "user_command", UserCommand, LATCHED, ("user_input",), ("strategy", "identify"), "the user's last wish"
 )
@@ -372,7 +404,9 @@ TOPICS: tuple[Topic, ...] = (
     ROBOT_POSE,
     TF,
     GAME_STATE,
+    EMERGENCY_STOP,
     USER_WISH,
+    USER_PRESENT,
     USER_COMMAND,
     WALK_COMMAND,
     HEAD_COMMAND,
@@ -389,7 +423,7 @@ TOPICS: tuple[Topic, ...] = (
     CLOCK,
 )
 
-FROM_PEOPLE: tuple[Topic, ...] = (USER_WISH, START_POSE)
+FROM_PEOPLE: tuple[Topic, ...] = (USER_WISH, EMERGENCY_STOP, START_POSE)
 """Topics that a person's viewer may publish; all others belong to the nodes."""
 
 RESET = Service("simulation/reset", Reset, "driver", "begin anew with a scenario and a seed")
@@ -399,7 +433,13 @@ SET_USER_COMMAND = Service("set_user_command", SetUserCommand, "user_input", "te
 START = Service("start", Trigger, "user_input", "obey the referee and play")
 STOP = Service("stop", Trigger, "user_input", "stop and stand, whatever the referee says")
 STAND = Service("stand", Trigger, "user_input", "stand up straight")
-GO_LIMP = Service("limp", Trigger, "user_input", "legs without stiffness")
+GO_LIMP = Service("limp", Trigger, "user_input", "legs without stiffness, until the next wish")
+ENGAGE_STOP = Service(
+    "engage_emergency_stop", Trigger, "user_input", "no stiffness in any joint, until the emergency stop is released"
+)
+RELEASE_STOP = Service(
+    "release_emergency_stop", Trigger, "user_input", "end the emergency stop; the robot stays limp until the next wish"
+)
 START_RECORDING = Service("start_recording", StartRecording, "recorder", "begin a recording")
 STOP_RECORDING = Service("stop_recording", StopRecording, "recorder", "end the recording")
 PAUSE_REPLAY = Service("replay/pause", Trigger, "replay", "hold the replay; of the log driver, too")
@@ -421,6 +461,8 @@ SERVICES: tuple[Service, ...] = (
     STOP,
     STAND,
     GO_LIMP,
+    ENGAGE_STOP,
+    RELEASE_STOP,
     SET_USER_COMMAND,
     START_RECORDING,
     STOP_RECORDING,
@@ -469,8 +511,8 @@ def markdown_graph() -> str:
     lines = ["```mermaid", "graph LR"]
     edges: dict[tuple[str, str], list[str]] = {}
     for topic in TOPICS:
-        if ALL_NODES in (topic.publishers, topic.subscribers):
-            continue
+        if ALL_NODES in (topic.publishers, topic.subscribers) or topic.publishers == topic.subscribers:
+            continue  # these would be lines from everybody to everybody
         for sender in topic.publishers:
             for listener in topic.subscribers:
                 edges.setdefault((sender, listener), []).append(topic.name)

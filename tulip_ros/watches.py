@@ -16,6 +16,8 @@ LEAP = 5.0  # [s] further forward than the wall clock went: more than any simula
 HOLD = 5.0  # [s] a jump of the clock stays told, so that a person sees it
 ENOUGH = 5.0  # expected messages without which a share of lost ones says nothing
 LOST = 0.2  # share of messages left out that counts as too slow
+STALL = 1.5  # [s] of wall-clock time between two looks, after which a process was held up
+DEAF = 5.0  # [s] without any message after that
 SECOND = 1_000_000_000  # [ns]
 
 
@@ -36,6 +38,8 @@ class InputWatch:
         """Messages that came so far."""
         self.stamp = 0
         """Stamp of the newest of them [ns]; 0 where they carry none."""
+        self.regular = rate > 0.0
+        """Whether they come all the time."""
         self._served = (0.0, 0)  # sum [s] and number since they were last told
         self._name, self._senders = name, " or ".join(senders)
         self._rate, self._missed_after = rate, missed_after
@@ -132,4 +136,36 @@ class TimeWatch:
             )
         if self._jump and now - self._jumped_at < HOLD:
             return Finding(Level.WARNING, self._jump)
+        return None
+
+
+class StallWatch:
+    """Tells that a node hears nobody any more since its process was held up.
+
+    The others take a process that is silent for 3 s for dead. One that goes on at just that moment may never hear of
+    it: then it knows all of them, and none of them sends to it.
+    """
+
+    def __init__(self, now: float) -> None:
+        """Begin at a wall-clock time [s]."""
+        self._last = now
+        self._held_up: tuple[float, float, int] | None = None  # for so long [s], until when [s], messages by then
+
+    def look(self, now: float, count: int) -> Finding | None:
+        """Return whether the node hears nobody.
+
+        Args:
+            now: Wall-clock time [s].
+            count: Messages that came so far, of inputs that come regularly.
+        """
+        gap, self._last = now - self._last, now
+        if gap > STALL and count:
+            self._held_up = (gap, now, count)
+        if self._held_up is None:
+            return None
+        duration, since, before = self._held_up
+        if count > before:
+            self._held_up = None
+        elif now - since > DEAF:
+            return Finding(Level.ERROR, f"hears nobody since it was held up for {duration:.0f} s: start it again")
         return None

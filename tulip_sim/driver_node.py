@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NoReturn
@@ -9,11 +10,16 @@ from typing import NoReturn
 import numpy as np
 
 from tulip_description.field import load_field
+from tulip_description.planar import Pose2D
 from tulip_description.robot import load_robot
 from tulip_msgs.srv import PlaceBall, Push, Reset
 from tulip_ros import topics
 from tulip_ros.run import run
-from tulip_sim.judging import Verdict
+from tulip_sim.crew import Crew
+from tulip_sim.hands import Hands
+from tulip_sim.judging import SECOND, Verdict
+from tulip_sim.match_referee import Order, SetDown
+from tulip_sim.match_rules import Role
 from tulip_sim.referee import Referee, RefereeParameters
 from tulip_sim.referee_link import hear_replies, open_referee
 from tulip_sim.scenario import SCENARIOS, make_scenario
@@ -21,7 +27,9 @@ from tulip_sim.secret_body import hidden_truth
 from tulip_sim.simulator_node import Joints, SimulatorNode, SimulatorParameters, Spin, TopicJoints
 from tulip_sim.truth import Truth
 from tulip_sim.world import World
+from tulip_strategy.interface import UserRequest
 
+LYING = 3 * SECOND  # [ns] until people help: time enough to see what the robot does by itself
 PUSH_TIME = 100  # [ms] over which a push's impulse is spread
 
 
@@ -30,6 +38,7 @@ class DriverNodeParameters(SimulatorParameters):
     """How the simulator runs, and what it simulates."""
 
     scenario: str = "trial"
+    hands: bool = False  # people set a robot that lies on its feet again, where it is, and let it play on
     secret_body: int = -1  # seed of other masses and CoMs that the robot really has, untold; -1 for robot.yaml's
     rules: RefereeParameters = field(default_factory=RefereeParameters)
 
@@ -78,6 +87,7 @@ class DriverNode(SimulatorNode):
             (topics.PUSH, self._on_push),
         ):
             self.create_service(service.type, service.name, answer)
+        self._crew = Crew(self, "") if p.hands else None
         self._wish: tuple[str, int] | None = None  # scenario and seed to begin anew with
         self._begin(p.scenario, p.seed)
 
@@ -88,6 +98,8 @@ class DriverNode(SimulatorNode):
         body, world = hidden_truth(self._robot, self._settings.world, None if secret < 0 else secret)
         self._referee.restart()
         self.begin_world(World(start, world, seed, self._field, self._robot, true_body=body), [[seed, 1]])
+        self._hands = Hands(self.world, self)
+        self._fell: int | None = None  # stamp [ns] since when the robot lies
 
     @property
     def interrupted(self) -> bool:
@@ -104,12 +116,48 @@ class DriverNode(SimulatorNode):
 
     def judge(self, spin: Spin) -> list[tuple[Truth, Verdict]]:
         """Let the referee see what is, and send its packet."""
+        self._hands.move()
         truth = self.world.truth()
         packet = self._referee.update(truth)
+        if self._crew is not None:
+            self._help(truth)
+            self._crew.speak(spin, self._settings.answer_bound)
         if packet is not None and self._referee_socket is not None:
             self._referee_socket.send(packet)
             hear_replies(self._referee_socket, self.health)
         return [(truth, self._referee.verdict())]
+
+    def _help(self, truth: Truth) -> None:
+        """Have the robot set on its feet if it lies for long."""
+        if not self._referee.lying:
+            self._fell = None
+        elif self._fell is None:
+            self._fell = truth.stamp
+        elif truth.stamp - self._fell > LYING:
+            (x, y, _), (_, _, turn, rest) = truth.base_position.tolist(), truth.base_orientation.tolist()
+            self._hands.take(Order((SetDown(0, Pose2D(x, y, 2.0 * math.atan2(turn, rest)), Role.STRIKER),)))
+            self._fell = truth.stamp
+
+    def make_limp(self, robot: int) -> None:
+        """Switch the robot's legs off."""
+        self._want(UserRequest.LIMP)
+
+    def let_stand(self, robot: int) -> None:
+        """Have the robot stand up straight."""
+        self._want(UserRequest.STAND)
+
+    def let_play(self, robot: int, role: Role) -> None:
+        """Let the robot play on as before."""
+        self._want(UserRequest.PLAY)
+
+    def tell_place(self, robot: int, pose: Pose2D) -> None:
+        """Tell the robot where it stands."""
+        if self._crew is not None:
+            self._crew.tell_place(pose)
+
+    def _want(self, request: UserRequest) -> None:
+        if self._crew is not None:
+            self._crew.want(request)
 
     def _on_reset(self, request: Reset.Request, response: Reset.Response) -> Reset.Response:
         name = request.scenario or self._scenario_name

@@ -6,18 +6,16 @@ world model where it was set down.
 
 from __future__ import annotations
 
-import time
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from tulip_description.field import load_field
 from tulip_description.planar import Pose2D
 from tulip_description.robot import load_robot
-from tulip_msgs.srv import SetUserCommand
 from tulip_ros import topics
 from tulip_ros.run import run
+from tulip_sim.crew import Crew
 from tulip_sim.hands import Hands
 from tulip_sim.judging import Verdict
 from tulip_sim.match_places import team_truth
@@ -31,10 +29,6 @@ from tulip_sim.truth import Truth
 from tulip_sim.world import World
 from tulip_strategy.game_controller import REFEREE_PORT
 from tulip_strategy.interface import UserRequest
-from tulip_worldmodel.messages import start_pose_to_message
-
-PATIENCE = 0.05  # [s] of one wait for a service's answer
-AGAIN = 5.0  # [s] of wall-clock time without an answer after which a wish is told again
 
 
 @dataclass(frozen=True)
@@ -63,7 +57,7 @@ class MatchDriverNode(SimulatorNode):
             replace(p.pictures, team_colour=COLOUR_NAMES[team], keeper_colour=COLOUR_NAMES[1 - team]) for team in TEAMS
         ]
         self.prepare(p, list(zip(NAMESPACES, cameras, strict=True)))
-        self._crews = [_Crew(self, namespace) for namespace in NAMESPACES]
+        self._crews = [Crew(self, namespace) for namespace in NAMESPACES]
         playing_field = load_field()
         self._referee = MatchReferee(p.rules, playing_field, p.seed)
         (first, second), ball = self._referee.places
@@ -104,47 +98,6 @@ class MatchDriverNode(SimulatorNode):
     def tell_place(self, robot: int, pose: Pose2D) -> None:
         """Tell a robot where it stands, in its own map."""
         self._crews[robot].tell_place(pose)
-
-
-class _Crew:
-    """A team's people at their robot."""
-
-    def __init__(self, node: MatchDriverNode, namespace: str) -> None:
-        self._node, self._namespace = node, namespace
-        self._place = node.sender(topics.START_POSE.within(namespace))
-        service = topics.SET_USER_COMMAND
-        self._service = node.create_client(service.type, f"{namespace}/{service.name}")
-        self._wishes: deque[SetUserCommand.Request] = deque()
-        self._answer: Any = None
-        self._asked = 0.0
-
-    def want(self, request: UserRequest, strategy: str = "") -> None:
-        """Note a wish; it is told as soon as the one before was answered."""
-        self._wishes.append(SetUserCommand.Request(request=request.value, strategy=strategy))
-
-    def tell_place(self, pose: Pose2D) -> None:
-        """Tell the robot where it stands, in its own map."""
-        self._place.publish(start_pose_to_message(pose, self._node.world.stamp))
-
-    def speak(self, spin: Spin, bound: float) -> None:
-        """Tell what there is to tell, and hold the time for the answers; no longer than `bound` [s] of wall clock."""
-        end = time.monotonic() + bound
-        while self._wishes:
-            now = time.monotonic()
-            if self._answer is None and self._service.service_is_ready():
-                self._answer, self._asked = self._service.call_async(self._wishes[0]), now
-            elif self._answer is not None and self._answer.done():
-                result = self._answer.result()
-                if not result.success:
-                    self._node.health.count("refused wishes", f"{self._namespace} refuses: {result.message}")
-                self._wishes.popleft()
-                self._answer = None
-                continue
-            elif self._answer is not None and now - self._asked > AGAIN:
-                self._answer = None  # the node was restarted meanwhile
-            if now > end:
-                return
-            spin(PATIENCE)
 
 
 def main() -> NoReturn:

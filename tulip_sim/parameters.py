@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from tulip_description.materials import Materials
 from tulip_driver.guard import GuardParameters, check_leg_gains
+from tulip_sim.faults import read_fault
 
 ENGINES = ("pybullet", "mujoco")
 """Physics engines that can stand behind a world."""
@@ -93,6 +94,7 @@ class WorldParameters:
     net_stiffness: float = 2.0e3  # [N/m] a net gives way
     net_damping: float = 100.0  # [N s/m] and takes the ball's speed: overdamped with this ball
     solver_iterations: int = 50  # [trial]
+    faults: tuple[str, ...] = ()  # of the sensors, from a moment on: see tulip_sim/faults.py
     sensors: SensorParameters = field(default_factory=SensorParameters)
     driver: DriverParameters = field(default_factory=DriverParameters)
 
@@ -125,6 +127,8 @@ class WorldParameters:
         for name in ("ball_rolling_deceleration", "ball_damping", "net_damping"):
             if not getattr(self, name) >= 0:
                 raise ValueError(f"{name} is {getattr(self, name)}; expected >= 0")
+        for line in self.faults:
+            read_fault(line)
 
     @classmethod
     def exact(cls) -> WorldParameters:

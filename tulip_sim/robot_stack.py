@@ -197,7 +197,7 @@ class RobotStack:
     def _see(self, tick: int) -> None:
         """Take a picture, look at it as soon as its camera pose is known, and use what was seen when it is due."""
         now = self.world.stamp
-        if tick == 0:
+        if tick == 0 and self.world.robots[self._number].faults.sees(now):
             self._exposed, self._looking = now, False
             self._eyes.expose(self.world.truth(self._number))
         if self._exposed is not None and not self._looking:

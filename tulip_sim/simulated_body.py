@@ -24,20 +24,29 @@ class SimulatedBody(Body):
         scenario: What stands where at the start.
         seed: Of the scenario and of all noise.
         harness: Whether it hangs from its trunk, feet off the ground, as a real one does when it is first switched on.
+        engine: Of its physics, one of `ENGINES`.
 
     Raises:
-        ValueError: for an unknown scenario or a seed that is none.
+        ValueError: for an unknown scenario or engine, or a seed that is none.
     """
 
     hardware = False
     simulated = True
 
-    def __init__(self, robot: Robot, scenario: str = "open", seed: int = 0, harness: bool = False) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        scenario: str = "open",
+        seed: int = 0,
+        harness: bool = False,
+        engine: str = WorldParameters.engine,
+    ) -> None:
         if scenario not in SCENARIOS:
             raise ValueError(f"scenario is {scenario!r}; expected one of {', '.join(SCENARIOS)}")
         if not isinstance(seed, int) or seed < 0:
             raise ValueError(f"seed is {seed!r}; expected an integer >= 0")
         self._robot, self._scenario, self._seed, self._hangs = robot, scenario, seed, harness
+        self._parameters = WorldParameters(engine=engine)
         self._world: World | None = None
         self._harness: Harness | None = None
 
@@ -46,7 +55,7 @@ class SimulatedBody(Body):
         self.stop()
         field = load_field()
         scenario = make_scenario(self._scenario, np.random.default_rng(self._seed), field)
-        self._world = World(scenario, WorldParameters(), self._seed, field, self._robot)
+        self._world = World(scenario, self._parameters, self._seed, field, self._robot)
         self._harness = Harness(self._world) if self._hangs else None
 
     def exchange(self, command: JointCommand | None) -> Sensors:

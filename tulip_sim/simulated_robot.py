@@ -18,6 +18,7 @@ from tulip_description.robot import Robot
 from tulip_description.robot_io import JointCommand, Sensors
 from tulip_sim.driver import MILLISECOND, JointDriver
 from tulip_sim.engine import RobotBody
+from tulip_sim.faults import SensorFaults
 from tulip_sim.parameters import WorldParameters
 from tulip_sim.sensors import BodyState, SensorModel, cell_forces
 from tulip_sim.touches import TouchCounter
@@ -74,6 +75,8 @@ class SimulatedRobot:
         self.joint_positions, self.joint_velocities = start.copy(), np.zeros(n)
         self._push_force, self._push_end = np.zeros(3), 0
         self._touches = {"left": TouchCounter(), "right": TouchCounter(), "body": TouchCounter()}
+        self.faults = SensorFaults(p.faults, robot.joint_names)
+        """What is broken about its sensors."""
         self._sensors = SensorModel(robot, p.sensors, sensor_rng, self._body_state(0))
         self._delay = int(physics_rng.integers(p.sensor_delay[0], p.sensor_delay[1] + 1))  # [ms]
         under_way = self._delay // p.sensors.period + 1
@@ -93,13 +96,21 @@ class SimulatedRobot:
         """Give a command to the driver at a time [ns]; return "" or the reason why it did not take it."""
         return self._driver.accept(command, now)
 
+    def limp(self, reason: str) -> None:
+        """Take all torque from the joints, and refuse commands until `release`."""
+        self._driver.limp(reason)
+
+    def release(self) -> None:
+        """Take commands again; every joint stays limp until its next one."""
+        self._driver.release()
+
     def silent_joints(self, now: int) -> tuple[str, ...]:
         """Return the joints that are only damped or limp at a time [ns], since nobody commands them any more."""
         return self._driver.silent_joints(now)
 
     def drive(self, now: int) -> None:
         """Put the torques of the next millisecond on the joints, and a push on the trunk while there is one."""
-        effort = self._driver.torques(now, self.joint_positions, self.joint_velocities)
+        effort = self._driver.torques(now, self.faults.felt(self.joint_positions, now), self.joint_velocities)
         self._effort_sum += effort
         self._effort_count += 1
         self.body.drive(effort - self._friction_torque())
@@ -113,7 +124,7 @@ class SimulatedRobot:
     def measure(self, now: int) -> None:
         """Read the sensors if a reading is due at this millisecond."""
         if (now // MILLISECOND + self._delay) % self._parameters.sensors.period == 0:
-            self._readings.append(self._sensors.measure(self._body_state(now)))
+            self._readings.append(self.faults.reading(self._sensors.measure(self._body_state(now))))
             self._effort_sum[:], self._effort_count = 0.0, 0
 
     def sensors(self, now: int) -> Sensors:

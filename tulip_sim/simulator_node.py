@@ -18,6 +18,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 
+from tulip_description.emergency_stop import StopWord
 from tulip_description.field import load_field
 from tulip_description.robot import load_robot
 from tulip_description.urdf import build_urdf
@@ -26,6 +27,7 @@ from tulip_motion.messages import joint_command_from_message, sensors_to_message
 from tulip_msgs.msg import FootForces
 from tulip_msgs.msg import JointCommand as JointCommandMessage
 from tulip_ros import topics
+from tulip_ros.emergency_stop import StopLink
 from tulip_ros.finding import Finding, Level
 from tulip_ros.run import ComponentNode
 from tulip_ros.time import stamp_of, to_message
@@ -131,6 +133,10 @@ class TopicJoints(Joints):
         self._late = 0  # answers that were not in when they were due, in the last second
         self._name = f"{namespace}: " if namespace else ""
         node.health.check(self._command_health)
+        self._emergency_stop = StopLink(
+            node, "driver", self._on_emergency_stop, topics.EMERGENCY_STOP.within(namespace)
+        )
+        node.health.check(self._emergency_stop_health)
         node.listen(topics.LEG_COMMAND.within(namespace), self._on_legs)
         node.listen(topics.HEAD_JOINT_COMMAND.within(namespace), self._on_head)
 
@@ -139,6 +145,8 @@ class TopicJoints(Joints):
         self._asked: int | None = None  # stamp of the sensors whose answer is due
         self._answer: JointCommandMessage | None = None
         self._newest: tuple[JointState, Imu, FootForces] | None = None
+        if self._emergency_stop.engaged:  # another world is no release
+            self._on_emergency_stop(self._emergency_stop.word)
 
     def measure(self) -> None:
         """Read the sensors; their answer is due in the tick after this one."""
@@ -183,6 +191,18 @@ class TopicJoints(Joints):
             f"{self._name}{late} leg commands came too late in the last second: free the processor for motion",
         )
 
+    def _emergency_stop_health(self) -> Finding | None:
+        """Tell of an emergency stop."""
+        found = self._emergency_stop.finding()
+        return None if found is None else Finding(found.level, f"{self._name}{found.words}")
+
+    def _on_emergency_stop(self, word: StopWord) -> None:
+        robot = self._node.world.robots[self._robot]
+        if word.engaged:
+            robot.limp(str(word))
+        else:
+            robot.release()
+
     def _is_from_before(self, message: JointCommandMessage) -> bool:
         """Tell whether a command answers sensors that are still to come: it was on its way when time began anew."""
         return stamp_of(message) > self._node.world.stamp
@@ -199,7 +219,7 @@ class TopicJoints(Joints):
 
     def _apply(self, message: JointCommandMessage) -> None:
         reason = self._node.world.apply(joint_command_from_message(message), self._robot)
-        if reason:
+        if reason and not self._emergency_stop.engaged:
             self._node.health.count("refused joint commands", f"joint command refused: {reason}")
 
 
@@ -320,7 +340,8 @@ class SimulatorNode(ComponentNode, ABC):
                 port.tell_truth(truth, verdict)
         if self._pace_settings.camera:
             for index, port in enumerate(self._ports):
-                if (self._tick - index * CAMERA_TICKS // len(self._ports)) % CAMERA_TICKS == 0:
+                due = (self._tick - index * CAMERA_TICKS // len(self._ports)) % CAMERA_TICKS == 0
+                if due and self.world.robots[index].faults.sees(self.world.stamp):
                     port.take_picture()
         self._tick += 1
         self._pace(spin)

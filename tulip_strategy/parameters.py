@@ -110,6 +110,7 @@ class StrategyParameters(GazeParameters):
     # Ball lost and found.
     ball_lost_age: float = 5.0  # [s] unseen: a resting ball stays where it was while the way round turns the back on it
     ball_found_age: float = 0.5  # [s] seen again
+    blind_age: float = 2.0  # [s] of the newest picture, after which the robot stands until it sees again
     ball_gone_time: float = 1.0  # [s] without any estimate: bridges one that is dropped and made again
     ball_confidence: float = 0.25  # below this it may be a false sighting
     look_back_time: float = 1.5  # [s] look where it was

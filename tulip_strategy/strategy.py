@@ -59,7 +59,7 @@ class Strategy:
             context.kicks = 0
         context.clear_wish()
         context.see(world)
-        self.tree = self._watch.state(stamp, [node.id for node in self._tree.tick()])
+        self.tree = self._watch.state(stamp, list(self._tree.tick()))
         return Decision(stamp, self._walk(), self._head(), context.kick, active_path(self._tree))
 
     def _walk(self) -> WalkCommand:

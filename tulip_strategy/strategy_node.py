@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rclpy.action import ActionClient
 
+from tulip_description.emergency_stop import StopWord
 from tulip_description.field import FieldError, load_field
 from tulip_motion.interface import KickGoal
 from tulip_motion.messages import head_command_to_message, motion_state_from_message, walk_command_to_message
@@ -15,6 +16,7 @@ from tulip_msgs.msg import MotionState as MotionStateMessage
 from tulip_msgs.msg import UserCommand as UserCommandMessage
 from tulip_msgs.msg import WorldState as WorldStateMessage
 from tulip_ros import topics
+from tulip_ros.emergency_stop import StopLink
 from tulip_ros.errors import BadInputError
 from tulip_ros.run import ComponentNode, run
 from tulip_strategy.interface import GameState, UserCommand, UserRequest
@@ -58,6 +60,7 @@ class StrategyNode(ComponentNode):
         self._decision = self.sender(topics.DECISION)
         self._tree = self.sender(topics.BEHAVIOUR_TREE)
         self._kicks = ActionClient(self, topics.KICK.type, topics.KICK.name)
+        self._emergency_stop = StopLink(self, "strategy", self._on_emergency_stop)
         self.listen(topics.WORLD_STATE, self._on_world_state)
         self.listen(topics.GAME_STATE, self._on_game_state)
         self.listen(topics.USER_COMMAND, self._on_user_command)
@@ -76,13 +79,19 @@ class StrategyNode(ComponentNode):
     def _on_user_command(self, message: UserCommandMessage) -> None:
         self._user = user_command_from_message(message)
 
+    def _on_emergency_stop(self, word: StopWord) -> None:
+        """Forget what the user wanted before: after its release the robot stays limp until the next wish."""
+        if word.engaged:
+            self._user = replace(self._user, request=UserRequest.LIMP)
+
     def _on_motion_state(self, message: MotionStateMessage) -> None:
         self._motion = message  # at 250 Hz; read when a decision needs it
 
     def _on_world_state(self, message: WorldStateMessage) -> None:
         world = world_state_from_message(message)
         motion = None if self._motion is None else motion_state_from_message(self._motion)
-        decision = self._strategy.decide(world.stamp, world, self._game, self._user, motion)
+        user = replace(self._user, request=UserRequest.LIMP) if self._emergency_stop.engaged else self._user
+        decision = self._strategy.decide(world.stamp, world, self._game, user, motion)
         self._walk.publish(walk_command_to_message(decision.walk))
         self._head.publish(head_command_to_message(decision.head))
         self._decision.publish(decision_to_message(decision))

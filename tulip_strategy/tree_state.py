@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
-from uuid import UUID
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -69,17 +68,19 @@ class TreeWatch:
         self._add(root, -1)
         self._names = tuple(node.name for node in self._nodes)
         self._kinds = tuple(_kind(node) for node in self._nodes)
+        self._places = {id(node): index for index, node in enumerate(self._nodes)}
 
-    def state(self, stamp: int, asked: Iterable[UUID] = ()) -> TreeState:
+    def state(self, stamp: int, asked: Iterable[Behaviour] = ()) -> TreeState:
         """Return the tree after a decision.
 
         Args:
             stamp: Of the decision [ns].
-            asked: Ids of the nodes that were asked; the others keep an old status that says nothing.
+            asked: The nodes that were asked; the others keep an old status that says nothing.
         """
-        now = frozenset(asked)
-        statuses = tuple(STATUSES[node.status] if node.id in now else NodeStatus.IDLE for node in self._nodes)
-        return TreeState(stamp, self._names, tuple(self._parents), self._kinds, statuses)
+        statuses = [NodeStatus.IDLE] * len(self._nodes)
+        for node in asked:
+            statuses[self._places[id(node)]] = STATUSES[node.status]
+        return TreeState(stamp, self._names, tuple(self._parents), self._kinds, tuple(statuses))
 
     def _add(self, node: Behaviour, parent: int) -> None:
         index = len(self._nodes)

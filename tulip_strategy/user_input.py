@@ -29,10 +29,13 @@ class UserInputParameters:
     autostart: bool = False  # play as soon as the referee says so; else stand until the user starts
     strategy: str = "dribble_and_kick"  # until the user chooses another
     walk_test_limits: tuple[float, float, float] = (0.6, 0.2, 1.0)  # [m/s], [m/s], [rad/s] the gait was tested with
+    walk_test_lifetime: float = 1.5  # [s] without a sign of who wanted it; bridges hiccups of a Wi-Fi
 
     def __post_init__(self) -> None:
         if not all(math.isfinite(limit) and limit > 0.0 for limit in self.walk_test_limits):
             raise ValueError(f"walk_test_limits is {self.walk_test_limits}; expected three finite numbers > 0")
+        if not (math.isfinite(self.walk_test_lifetime) and self.walk_test_lifetime > 0.0):
+            raise ValueError(f"walk_test_lifetime is {self.walk_test_lifetime} s; expected a finite number > 0")
 
 
 class UserInput:
@@ -55,11 +58,31 @@ class UserInput:
         self._strategies = strategies
         request = UserRequest.PLAY if parameters.autostart else UserRequest.STOP
         self._command = UserCommand(stamp, request, parameters.strategy)
+        self._stopped = ""  # why an emergency stop holds
+
+    def recall(self, command: UserCommand) -> None:
+        """Go on with the wish that held when this program died."""
+        if command.strategy in self._strategies:
+            self._command = command
 
     @property
     def command(self) -> UserCommand:
         """The command that holds."""
         return self._command
+
+    def stop(self, stamp: int, reason: str) -> None:
+        """Want limp legs and nothing else until `release`, and limp legs after it until the next wish.
+
+        Args:
+            stamp: When [ns].
+            reason: In words, not empty.
+        """
+        self.ask(stamp, UserRequest.LIMP)
+        self._stopped = reason
+
+    def release(self) -> None:
+        """Take wishes again."""
+        self._stopped = ""
 
     def ask(
         self,
@@ -84,6 +107,8 @@ class UserInput:
         if request not in tuple(UserRequest):
             return f"request is {request}; expected 0 to {max(UserRequest).value}"
         wish = UserRequest(request)
+        if self._stopped and wish is not UserRequest.LIMP:
+            return f"{self._stopped}; release it first"
         refusal = ""
         if wish is UserRequest.PLAY and strategy and strategy not in self._strategies:
             refusal = f"strategy is {strategy!r}; expected one of: {', '.join(sorted(self._strategies))}"
@@ -103,6 +128,19 @@ class UserInput:
             sequence=self._command.sequence + 1,
         )
         return ""
+
+    def end_walk_test(self, stamp: int) -> bool:
+        """Stop and stand if a walk test goes on: whoever wanted it gives no sign any more.
+
+        Args:
+            stamp: When [ns].
+
+        Returns:
+            Whether one went on.
+        """
+        if self._command.request is not UserRequest.WALK_TEST:
+            return False
+        return not self.ask(stamp, UserRequest.STOP)
 
     def _check(self, velocity: tuple[float, float, float]) -> str:
         for (name, unit), value, limit in zip(_AXES, velocity, self._parameters.walk_test_limits, strict=True):

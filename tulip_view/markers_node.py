@@ -13,6 +13,7 @@ from tulip_description.robot import load_robot
 from tulip_msgs.msg import Features, MotionState, WorldState
 from tulip_ros import topics
 from tulip_ros.errors import BadInputError
+from tulip_ros.priority import give_way
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.time import stamp_of
 from tulip_view.markers import feature_markers, field_markers, motion_markers, world_markers
@@ -70,7 +71,9 @@ class MarkersNode(ComponentNode):
                 topics.MOTION_STATE: self._on_motion,
                 topics.FEATURES: self._on_features,
             }
-            self._ears = [topic.subscribe_from(self, callback, depth=1) for topic, callback in ears.items()]
+            self._ears = [
+                topic.subscribe_from(self, callback, depth=1, only_looks=True) for topic, callback in ears.items()
+            ]
         elif not wanted:
             while self._ears:
                 self.destroy_subscription(self._ears.pop())
@@ -99,4 +102,5 @@ class MarkersNode(ComponentNode):
 
 
 if __name__ == "__main__":
+    give_way()
     run(MarkersNode)

@@ -14,7 +14,7 @@ class Outcome:
 
     Attributes:
         what: Was asked for.
-        verdict: "taken", "refused" or, where nobody answered, "not done".
+        verdict: "taken", "refused" or, where nobody answered, "not done"; "sent" where nobody needs to answer.
         words: Why not, or what else the server says.
     """
 

@@ -1,13 +1,23 @@
-"""The user's wish and the game in words, for all faces that show them."""
+"""The emergency stop, the user's wish and the game in words, for all who show them."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from tulip_ros.emergency_stop import word_from_message
 from tulip_strategy.interface import UserRequest
 from tulip_view.columns import PHASES, SECONDARY, SET_PLAYS, name_of
 
 REQUESTS = {request.value: request.name.lower().replace("_", " ") for request in UserRequest}
+
+
+def stop_words(message: Any) -> str:
+    """Return what somebody said of the emergency stop.
+
+    Args:
+        message: Of the emergency stop.
+    """
+    return str(word_from_message(message))
 
 
 def wish_words(command: Any) -> str:

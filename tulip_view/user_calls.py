@@ -5,19 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 from threading import RLock
 from typing import Any
 
 from rclpy.client import Client
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from std_msgs.msg import String
 
+from tulip_description.emergency_stop import StopWord
 from tulip_ros import topics
 from tulip_ros.asking import Asker, NotServedError
+from tulip_ros.emergency_stop import StopLink
 from tulip_ros.topics import Service
 from tulip_strategy.interface import UserRequest
 from tulip_strategy.user_input import Wish
 from tulip_view.outcome import PUSHES, Outcome
 
+PRESENCE = 0.25  # [s] between two signs that the user is there; the walk test ends after six that are missing
 NO_USER_INPUT = "node user_input does not run: python3 scripts/launch.py starts it"
 NO_SIMULATOR = "no simulator of a single robot runs"
 NO_RECORDER = "no recorder runs; start one in a terminal: python3 scripts/record.py --wait"
@@ -27,24 +33,47 @@ NO_EXPERIMENT = "node identify does not run: python3 scripts/launch.py identify 
 class UserCalls:
     """Clients of all that people can ask a robot for. Calls do not wait for answers, which are told when they come."""
 
-    def __init__(self, node: Node, asker: Asker, robot: str, tell: Callable[[Outcome], None]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        asker: Asker,
+        face: str,
+        robot: str,
+        tell: Callable[[Outcome], None],
+        is_watched: Callable[[], bool] = lambda: True,
+    ) -> None:
         """Make the clients.
 
         Args:
             node: Has them; an executor serves it.
             asker: That node's.
+            face: What people have before them, as in "menu".
             robot: Namespace of the robot; "" for one that is alone.
             tell: Is told each outcome, from the node's thread or the caller's.
+            is_watched: Whether somebody is at this face; a walk test that began here ends soon after nobody is.
         """
         self._asker, self._tell = asker, tell
         self._order = RLock()  # of wishes: answers come in another thread
         self._walk_is_asked = False
         self._next_walk: Wish | None = None
+        self._walk: list[float] | None = None  # velocity of the walk test that this face began and that holds
+        self._is_watched = is_watched
+        self._sign = String(data=node.get_fully_qualified_name())
+        self._present = topics.USER_PRESENT.within(robot).publish_from(node)
+        topics.USER_COMMAND.within(robot).subscribe_from(node, self._on_command)
+        node.create_timer(PRESENCE, self._give_sign, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+        def full(name: str, namespace: str = robot) -> str:
+            return f"/{namespace}/{name}".replace("//", "/")
 
         def client(service: Service, namespace: str = robot) -> Client:
-            return node.create_client(service.type, f"/{namespace}/{service.name}".replace("//", "/"))
+            return node.create_client(service.type, full(service.name, namespace))
 
-        self._wishes, self._pushes = client(topics.SET_USER_COMMAND), client(topics.PUSH)
+        stop = topics.EMERGENCY_STOP
+        self._stop = StopLink(node, face, topic=replace(stop, name=full(stop.name)), knows_time=False)
+        self._wishes, self._pushes, self._releases = map(
+            client, (topics.SET_USER_COMMAND, topics.PUSH, topics.RELEASE_STOP)
+        )
         # A recorder of the robot's own, or one outside that records all robots.
         self._recorders = {
             begin: [client(service, namespace) for namespace in dict.fromkeys((robot, ""))]
@@ -55,12 +84,32 @@ class UserCalls:
     @property
     def reaches_user_input(self) -> bool:
         """Whether node user_input is there."""
-        return bool(self._wishes.service_is_ready())
+        return bool(self._wishes.service_is_ready() and self._releases.service_is_ready())
 
     @property
     def reaches_experiment(self) -> bool:
         """Whether node identify is there."""
         return bool(self._experiments[False].service_is_ready())
+
+    @property
+    def stop(self) -> StopWord:
+        """What counts of the emergency stop."""
+        return self._stop.word
+
+    def emergency_stop(self, reason: str) -> None:
+        """Stop the robot; every node hears it by itself, so that none is needed for the others.
+
+        Args:
+            reason: In words, as in "key l".
+        """
+        with self._order:
+            self._next_walk = None
+            self._stop.engage(reason)
+        self._tell(Outcome("emergency stop", "sent"))
+
+    def release(self) -> None:
+        """Release the emergency stop; the robot stays limp until the next wish."""
+        self._ask(self._releases, self._releases.srv_type.Request(), "release", NO_USER_INPUT)
 
     def wish(self, wish: Wish) -> None:
         """Tell the robot what the user wants.
@@ -70,6 +119,7 @@ class UserCalls:
         """
         with self._order:
             self._next_walk = None
+            self._walk = list(wish.velocity) if wish.request is UserRequest.WALK_TEST else None
             if self._walk_is_asked and wish.request is UserRequest.WALK_TEST:
                 self._next_walk = wish
             else:
@@ -90,6 +140,18 @@ class UserCalls:
             self._walk_is_asked, wish, self._next_walk = False, self._next_walk, None
             if served and wish is not None:
                 self._send(wish)
+
+    def _on_command(self, command: Any) -> None:
+        """Leave the walk test to others if another wish holds; what is heard before the answer is from before."""
+        with self._order:
+            if not self._walk_is_asked and (
+                command.request != UserRequest.WALK_TEST or list(command.velocity) != self._walk
+            ):
+                self._walk = None
+
+    def _give_sign(self) -> None:
+        if self._walk is not None and self._is_watched():
+            self._present.publish(self._sign)
 
     def push(self, direction: str, size: float, heading: float) -> None:
         """Push the simulated robot's trunk.

@@ -9,6 +9,8 @@ from nav_msgs.msg import Odometry as OdometryMessage
 
 from tulip_description.field import FieldError, load_field
 from tulip_description.planar import Pose2D
+from tulip_description.quaternion import pose_on_ground
+from tulip_motion.interface import Odometry
 from tulip_motion.messages import odometry_from_message
 from tulip_msgs.msg import Features as FeaturesMessage
 from tulip_ros import topics
@@ -46,6 +48,7 @@ class WorldModelNode(ComponentNode):
         super().__init__("worldmodel")
         p = self._settings = self.load(WorldModelNodeParameters())
         self._start = Pose2D(p.start_x, p.start_y, p.start_yaw)
+        self._before = self.keepsake.read()  # where the robot was when this node died
         self.begin_anew()
         self._world_state = self.sender(topics.WORLD_STATE)
         self._robot_pose = self.sender(topics.ROBOT_POSE)
@@ -66,8 +69,10 @@ class WorldModelNode(ComponentNode):
         self._newest: int | None = None  # stamp of the newest odometry [ns]
 
     def _on_odometry(self, message: OdometryMessage) -> None:
-        stamp = stamp_of(message)
-        self._world.add_odometry(odometry_from_message(message))
+        stamp, odometry = stamp_of(message), odometry_from_message(message)
+        if self._newest is None:
+            self._go_on_from_before(odometry)
+        self._world.add_odometry(odometry)
         published = self._last_published
         if published is None or stamp - published >= self._settings.publish_period * 1e9:
             self._publish(stamp)
@@ -87,13 +92,30 @@ class WorldModelNode(ComponentNode):
         if pose is None:
             self.health.count("bad start poses", "initialpose holds no pose on the ground; expected finite numbers")
             return
+        if stamp_of(message) <= self._before.get("stamp", -1):
+            return  # latched: it was used before this node died
         self._start = pose
         self.begin_anew()
+
+    def _go_on_from_before(self, odometry: Odometry) -> None:
+        """Begin where the robot has come to since this node died, unless time began anew."""
+        if odometry.stamp < self._before.get("stamp", odometry.stamp + 1):
+            return
+        then, in_map = (Pose2D(*self._before[name]) for name in ("odom", "map"))
+        start, self._start = (
+            self._start,
+            in_map @ then.inverse() @ pose_on_ground(odometry.position, odometry.orientation),
+        )
+        self.begin_anew()
+        self._start = start
 
     def _publish(self, stamp: int) -> None:
         self._last_published = stamp
         world = self._world.state(stamp)
         self._world_state.publish(world_state_to_message(world))
+        robot = world.robot
+        poses = {"map": robot.pose.as_array().tolist(), "odom": robot.pose_in_odom.as_array().tolist()}
+        self.keepsake.keep({"stamp": world.stamp, **poses})
         self._robot_pose.publish(robot_pose_to_message(world))
         self._transforms.publish(map_to_odom_message(world))
 

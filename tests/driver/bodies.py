@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from tulip_description.robot import LEG_JOINTS, Robot, load_robot
@@ -31,10 +33,11 @@ class NotedBody(EchoBody):
         super().__init__(robot, self.time)
         self.told: list[JointCommand | None] = []
         self.stopped = 0
+        self.emergency = ""
 
     def exchange(self, command: JointCommand | None) -> Sensors:
         self.told.append(command)
-        return super().exchange(command)
+        return replace(super().exchange(command), emergency=self.emergency)
 
     def stop(self) -> None:
         self.stopped += 1

@@ -19,6 +19,7 @@ from tulip_driver.contract import Body, BodyError
 from tulip_driver.log_body import LogBody
 from tulip_sim.lockstep import Lockstep
 from tulip_sim.lockstep_recording import LockstepRecording
+from tulip_sim.parameters import ENGINES
 from tulip_sim.scenario import make_scenario
 from tulip_sim.simulated_body import SimulatedBody
 
@@ -48,12 +49,15 @@ class Changed(VirtualBody):
 def test_the_echo_body_passes_every_check() -> None:
     rows = rows_of(VirtualBody())
     assert verdict(rows)[0], [row for row in rows if row.judgement is Judgement.FAIL]
-    assert {row.what for row in rows} >= {*JOINTS, "limp: stiffness gone", "silence: damping", "garbage: NaN"}
+    assert {row.what for row in rows} >= {*JOINTS, "limp: stiffness gone", "silence: legs damped", "garbage: NaN"}
 
 
 @pytest.mark.sim
-def test_the_simulated_robot_in_its_harness_passes_every_check() -> None:
-    rows = rows_of(SimulatedBody(ROBOT, harness=True))
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_simulated_robot_in_its_harness_passes_every_check(engine: str) -> None:
+    if engine == "mujoco":
+        pytest.importorskip("mujoco", reason="MuJoCo is not installed (extra mujoco)")
+    rows = rows_of(SimulatedBody(ROBOT, harness=True, engine=engine))
     assert verdict(rows)[0], [row for row in rows if row.judgement is Judgement.FAIL]
 
 

@@ -145,7 +145,7 @@ def test_a_body_whose_clock_rules_and_whose_readings_are_lost_is_damped_by_the_w
     lost = loop.sensors
     loop.tick()
     body.exchange = lambda told: body.told.append(told) or replace(lost, joint_efforts=np.full(14, np.nan))  # type: ignore
-    for milliseconds, stiffness in ((900, 100.0), (1080, 100.0), (1110, 0.0)):
+    for milliseconds, stiffness in ((900, 100.0), (1000 + LIFE - 10, 100.0), (1000 + LIFE + 10, 0.0)):
         wall.now = milliseconds * MILLISECOND
         loop.tick()
         assert told(body).stiffness[0] == stiffness, milliseconds
@@ -165,6 +165,37 @@ def test_limp_takes_all_torque_with_the_next_exchange_and_lasts_until_released()
     assert loop.accept(command(loop.now, 1, stiffness=100.0)) == ""
     loop.tick()
     assert told(body).stiffness[0] == 100.0
+
+
+def test_who_commands_a_limp_robot_is_known_to_live_and_to_have_answered() -> None:
+    loop, body = started()
+    loop.limp("emergency stop")
+    loop.tick()
+    assert not loop.answered
+    assert loop.accept(command(loop.now, 1, stiffness=100.0))
+    assert loop.answered and loop.silent_joints == ()
+    for _ in range(LIFE // 4 + 1):
+        loop.tick()
+    assert loop.silent_joints == LEG_JOINTS
+    assert not told(body).stiffness.any() and not told(body).damping.any()
+
+
+def test_a_body_that_asks_for_an_emergency_stop_is_limp_with_the_next_exchange_and_stays_so_while_it_asks() -> None:
+    loop, body = started()
+    loop.accept(command(loop.now, 1, stiffness=100.0))
+    body.emergency = "its stop button is pressed"
+    loop.tick()
+    loop.tick()
+    assert told(body).names == JOINTS and not told(body).stiffness.any()
+    assert "made limp (its stop button is pressed)" in loop.accept(command(loop.now, 2, stiffness=100.0))
+    loop.release()
+    loop.tick()
+    assert loop.accept(command(loop.now, 3, stiffness=100.0))
+    body.emergency = ""
+    loop.tick()
+    assert loop.accept(command(loop.now, 4, stiffness=100.0))  # that the button is out again is no release
+    loop.release()
+    assert loop.accept(command(loop.now, 5, stiffness=100.0)) == ""
 
 
 def test_answers_to_old_sensors_or_to_some_of_another_time_are_refused() -> None:

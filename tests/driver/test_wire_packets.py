@@ -43,6 +43,24 @@ def test_a_command_of_one_joint_has_the_bits_that_the_document_says() -> None:
     assert data == body + struct.pack("<I", zlib.crc32(body))
 
 
+@pytest.mark.parametrize(
+    ("words", "heard", "number"),
+    [
+        ("its stop button is pressed", "its stop button is pressed", 1),
+        ("winding of left_knee is broken", "it has a fault", 2),
+    ],
+)
+def test_a_body_that_asks_for_an_emergency_stop_says_so_in_a_frame_of_its_own(
+    words: str, heard: str, number: int
+) -> None:
+    assert 0x330 not in reading_frames(READING)["id"]
+    frames = reading_frames(replace(READING, emergency=words))
+    assert (frames[-1]["id"], frames[-1]["data"].tolist()) == (0x330, [number, 0, 0, 0])
+    assert reading_of(Packet(Kind.READING, 1, 1, frames), len(JOINTS)).emergency == heard
+    frames["data"][-1, 0] = 77  # of a newer body
+    assert reading_of(Packet(Kind.READING, 1, 1, frames), len(JOINTS)).emergency == "for its reason number 77"
+
+
 def test_a_joints_reading_has_the_bits_that_the_document_says() -> None:
     reading = replace(
         READING,

@@ -142,3 +142,19 @@ def test_feet_land_where_the_footsteps_were_announced() -> None:
     assert max(landings) < 0.04  # [m] of tracking in the swing
     run.go(4.0)
     assert run.motion.footsteps == ()
+
+
+def test_restarted_while_the_robot_falls_it_stays_limp_and_stands_when_people_have_set_it_up() -> None:
+    run = Run()
+    run.go(1.0)
+    run.world.push((600.0, 0.0, 0.0), 100)
+    run.world.advance(600)  # nobody commands the joints meanwhile
+    run.motion, run._pending = Motion(MotionParameters(), run.world.robot), None
+    run.go(1.0)
+    assert run.motion.mode is MotionMode.FALLEN
+    assert "was found leaning by" in run.motion.state().reason or "falls" in run.motion.state().reason
+    assert np.abs(run.world.sensors().joint_efforts[:12]).max() < 5.0
+    run.world.set_upright()
+    run.go(0.5)
+    assert run.motion.mode is MotionMode.STAND
+    assert run.world.truth().base_position[2] > 0.9

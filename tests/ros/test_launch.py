@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -16,8 +17,9 @@ from tulip_ros import topics, transport
 from tulip_ros.aggregation import Report
 from tulip_ros.errors import BadInputError
 from tulip_ros.finding import Level
-from tulip_ros.launch import DEATHS, Launcher
+from tulip_ros.launch import Launcher
 from tulip_ros.monitor import Monitor
+from tulip_ros.node_process import DEATHS
 from tulip_ros.nodes import NodeEntry
 from tulip_ros.plan import Start, make_plan
 from tulip_ros.run import ComponentNode, session
@@ -89,12 +91,51 @@ def test_a_node_is_told_how_many_times_it_was_started_again(launch):
 
 
 def test_node_that_ignores_sigterm_is_killed(launch, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("tulip_ros.launch.PATIENCE", 0.2)
+    monkeypatch.setattr("tulip_ros.ending.PATIENCE", 0.2)
     with launch(a=STUBBORN) as launcher:
         wait_for(lambda: is_up(launcher, "a"))
         pid = launcher.states()[0].pid
     assert not is_alive(pid)
     assert launcher.states()[0].exit_code == -signal.SIGKILL
+
+
+NOTING = """
+import signal, sys, time
+from pathlib import Path
+def end(*_):
+    Path(__file__).with_suffix(".asked").write_text(str(time.monotonic_ns()))
+    time.sleep(0.3)
+    Path(__file__).with_suffix(".ended").write_text(str(time.monotonic_ns()))
+    sys.exit(0)
+signal.signal(signal.SIGTERM, end)
+print('up', flush=True)
+time.sleep(60)
+"""
+
+
+def test_the_driver_has_ended_before_the_others_are_asked_to_and_the_recorder_comes_last(launch, tmp_path: Path):
+    names = ("recorder", "motion", "driver")
+    with launch(**dict.fromkeys(names, NOTING)) as launcher:
+        wait_for(lambda: all(is_up(launcher, name) for name in names))
+    asked, ended = (
+        {name: int((tmp_path / f"fake_{name}.{what}").read_text()) for name in names} for what in ("asked", "ended")
+    )
+    assert ended["driver"] < asked["motion"] < ended["motion"] < asked["recorder"]
+
+
+def test_a_second_ctrl_c_hurries_the_end_and_leaves_no_orphans(launch, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("tulip_ros.ending.PATIENCE", 1e6)
+    monkeypatch.setattr("tulip_ros.ending.ALONE", 1e6)
+    names = ("driver", "motion", "recorder")
+    with launch(**dict.fromkeys(names, STUBBORN)) as launcher:
+        wait_for(lambda: all(is_up(launcher, name) for name in names))
+        pids = [state.pid for state in launcher.states()]
+        again = [threading.Timer(delay, os.kill, (os.getpid(), signal.SIGINT)) for delay in (0.3, 0.4)]
+        for timer in again:
+            timer.start()
+    assert not any(is_alive(pid) for pid in pids)
+    assert {state.exit_code for state in launcher.states()} == {-signal.SIGKILL}
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_refused_input_ends_the_launch_with_the_nodes_own_words(launch):
@@ -107,12 +148,13 @@ def test_refused_input_ends_the_launch_with_the_nodes_own_words(launch):
 
 
 def test_node_that_dies_again_and_again_is_given_up(launch, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("tulip_ros.launch.LONGEST_PAUSE", 0.01)
+    monkeypatch.setattr("tulip_ros.node_process.LONGEST_PAUSE", 0.01)
     with launch(a=CRASHING) as launcher:
         lines: list[str] = []
         wait_for(lambda: lines.extend(launcher.poll()) or launcher.states()[0].state == "given up")
         assert launcher.states()[0].restarts == DEATHS - 1
-        assert "broken motor" in lines[-1]
+        assert launcher.given_up == ("a",)
+        assert any("broken motor" in line for line in lines)
 
 
 def test_log_folder_that_cannot_be_made_is_refused(tmp_path: Path):

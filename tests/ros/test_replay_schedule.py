@@ -13,8 +13,9 @@ from tulip_msgs.msg import GameState, MotionState
 from tulip_ros import cdr, schemas, topics
 from tulip_ros.bag import Bag
 from tulip_ros.errors import BadInputError
+from tulip_ros.latched import quality_of
 from tulip_ros.log_file import Log, LoggedTopic
-from tulip_ros.replay import CLOCK_PERIOD, Passage, ReplayParameters, Schedule, playable, quality_of
+from tulip_ros.replay import CLOCK_PERIOD, Passage, ReplayParameters, Schedule, playable
 from tulip_ros.time import header
 
 MS = 1_000_000

@@ -7,9 +7,12 @@ import re
 from pathlib import Path
 
 import pytest
+from rclpy.node import Node
+from rclpy.qos import ReliabilityPolicy
 
 from tulip_ros import topics
 from tulip_ros.nodes import DRIVERS, NODES, ROBOT
+from tulip_ros.run import session
 from tulip_sim.timing import CAMERA_TICKS, DECISION_TICKS, SLOW_TICKS, TICK
 
 NAME = re.compile(r"[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*")
@@ -81,3 +84,21 @@ def test_no_playing_nodes_program_mentions_the_ground_truth():
         spec = importlib.util.find_spec(NODES[name].module)
         assert spec is not None and spec.origin is not None, f"node {name} has no module {NODES[name].module}"
         assert "ground_truth" not in Path(spec.origin).read_text().lower(), name
+
+
+def test_who_only_looks_has_nothing_repeated_for_it_but_what_is_latched(ros_domain: int) -> None:
+    with session(lambda: Node("viewer"), arguments=[]) as (node, _):
+        found = {}
+        for topic in (topics.JOINT_STATES, topics.GAME_STATE):
+            for only_looks in (False, True):
+                ear = topic.subscribe_from(node, lambda _: None, only_looks=only_looks)
+                (profile,) = [each.qos_profile for each in node.get_subscriptions_info_by_topic(topic.name)]
+                found[topic.name, only_looks] = profile.reliability
+                node.destroy_subscription(ear)
+    reliable, best_effort = ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT
+    assert found == {
+        (topics.JOINT_STATES.name, False): reliable,
+        (topics.JOINT_STATES.name, True): best_effort,
+        (topics.GAME_STATE.name, False): reliable,
+        (topics.GAME_STATE.name, True): reliable,
+    }

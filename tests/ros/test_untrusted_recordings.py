@@ -21,10 +21,10 @@ from tulip_ros.bag import Bag
 from tulip_ros.cdr import without_gaps
 from tulip_ros.decompression import LARGEST, beginning, unpacked
 from tulip_ros.errors import BadInputError
+from tulip_ros.latched import SPARE, quality_of
 from tulip_ros.log_file import Log, LoggedTopic, files_of
 from tulip_ros.log_index import DamagedLogError
 from tulip_ros.recovery import recover
-from tulip_ros.replay import SPARE, quality_of
 from tulip_ros.serialized import after_header, time_at
 
 BOMB = 2**26  # [B] that some kilobytes unpack to
@@ -129,7 +129,7 @@ def test_a_mended_recording_has_no_broken_chunk_in_it(tmp_path: Path) -> None:
     with Log(path) as log:
         summary = log._files[0].summary
     file.schemas, file.channels = dict(summary.schemas), dict(summary.channels)
-    file.add_compressed(bytes(broken), "", head.span, len(broken), crc32(bytes(broken)), {})
+    file.add_compressed([bytes(broken)], "", head.span, len(broken), crc32(bytes(broken)), {})
     file.abandon()  # as when its recorder was killed
     with pytest.raises(BadInputError):
         Log(file.path)

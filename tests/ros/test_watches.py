@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tulip_ros.finding import Finding, Level, say, worst
-from tulip_ros.watches import GRACE, HOLD, InputWatch, TimeWatch
+from tulip_ros.watches import GRACE, HOLD, InputWatch, StallWatch, TimeWatch
 
 SECOND = 1_000_000_000
 LOOK = 0.2
@@ -125,3 +125,22 @@ def test_the_worst_is_said_first_and_what_is_well_only_when_nothing_is_wrong() -
     assert (worst([]), say([])) == (Level.OK, "")
     assert say([well]) == "well"
     assert (worst([well, slow, blind]), say([well, slow, blind])) == (Level.ERROR, "blind; slow")
+
+
+def test_a_node_that_hears_nobody_since_it_was_held_up_says_so_until_a_message_comes() -> None:
+    watch = StallWatch(0.0)
+    assert watch.look(0.2, 50) is None
+    assert watch.look(3.4, 50) is None  # held up
+    assert [watch.look(3.4 + 0.2 * step, 50) for step in range(1, 25)] == [None] * 24
+    found = watch.look(8.6, 50)
+    assert found is not None and found.words == "hears nobody since it was held up for 3 s: start it again"
+    assert watch.look(8.8, 51) is None
+    assert watch.look(9.0, 51) is None
+
+
+def test_a_node_that_was_held_up_and_hears_again_or_never_heard_anybody_is_no_matter() -> None:
+    watch, first = StallWatch(0.0), StallWatch(0.0)
+    assert watch.look(0.2, 50) is None
+    looks = [(3.4, 50), (3.6, 60), *((4.0 + 0.2 * step, 60) for step in range(50))]
+    assert [watch.look(*look) for look in looks] == [None] * 52
+    assert [first.look(now, 0) for now in (0.2, 3.4, *(3.6 + 0.2 * step for step in range(40)))] == [None] * 42

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -19,6 +20,7 @@ from tulip_description.planar import Pose2D
 from tulip_motion.interface import HeadCommand, HeadMode, MotionMode, WalkCommand, WalkMode
 from tulip_motion.messages import motion_state_to_message
 from tulip_ros import topics
+from tulip_ros.emergency_stop import StopLink
 from tulip_ros.errors import BadInputError
 from tulip_ros.finding import Level
 from tulip_ros.run import session
@@ -178,6 +180,31 @@ def test_user_input_takes_wishes_and_refuses_bad_ones() -> None:
         assert commands[2].request == UserRequest.PLAY
 
 
+def test_a_walk_test_goes_on_while_its_user_gives_signs_and_ends_soon_after_the_last_one() -> None:
+    with running(UserInputNode, "walk_test_lifetime:=1.0") as (node, until):
+        commands: list[Any] = []
+        topics.USER_COMMAND.subscribe_from(node, commands.append)
+        wishes, signs = topics.USER_WISH.publish_from(node), topics.USER_PRESENT.publish_from(node)
+        until(lambda: bool(commands) and wishes.get_subscription_count() == signs.get_subscription_count() == 1)
+        wishes.publish(topics.USER_WISH.message(request=UserRequest.WALK_TEST.value, velocity=[0.1, 0.0, 0.0]))
+        begin = time.monotonic()
+
+        def goes_on() -> bool:
+            signs.publish(topics.USER_PRESENT.message(data="face"))
+            time.sleep(0.02)
+            return time.monotonic() - begin > 2.0
+
+        until(goes_on)
+        assert [command.request for command in commands] == [UserRequest.STOP, UserRequest.WALK_TEST]
+        last = time.monotonic()
+        until(lambda: len(commands) == 3)
+        assert commands[2].request == UserRequest.STOP
+        assert time.monotonic() - last > 0.9
+        signs.publish(topics.USER_PRESENT.message(data="face"))  # late ones bring nothing back
+        until(lambda: time.monotonic() - last > 1.5)
+        assert len(commands) == 3
+
+
 def topics_trigger() -> Any:
     from std_srvs.srv import Trigger
 
@@ -239,3 +266,39 @@ def test_strategy_publishes_commands_and_sends_the_kick_as_an_action() -> None:
         assert heads[-1].mode == HeadMode.LOOK_AT
         client.destroy()
         server.destroy()
+
+
+def test_strategy_wants_limp_legs_while_an_emergency_stop_holds_and_after_it_until_the_users_next_wish() -> None:
+    with running(StrategyNode) as (node, until):
+        walks: list[Any] = []
+        topics.WALK_COMMAND.subscribe_from(node, walks.append)
+        worlds, user = (topic.publish_from(node) for topic in (topics.WORLD_STATE, topics.USER_COMMAND))
+        until(lambda: bool(worlds.get_subscription_count() and user.get_subscription_count()))
+        stop = StopLink(node, "tester")
+
+        def wish(request: UserRequest) -> None:
+            user.publish(user_command_to_message(UserCommand(0, request, velocity=(0.2, 0.0, 0.0))))
+
+        def until_mode(mode: WalkMode) -> None:
+            """Let strategy decide until it wants that."""
+            for tick in range(1000):
+                seen = len(walks)
+                worlds.publish(world_state_to_message(world(10**9 + tick * 20_000_000)))
+                until(lambda seen=seen: len(walks) > seen)  # type: ignore[misc]
+                if walks[-1].mode == mode:
+                    return
+            raise AssertionError(f"it did not come to want {mode.name}")
+
+        wish(UserRequest.WALK_TEST)
+        until_mode(WalkMode.WALK)
+        stop.engage("a test")
+        until_mode(WalkMode.LIMP)
+        wish(UserRequest.WALK_TEST)  # of a user input that has not heard of the stop yet
+        for _ in range(10):
+            until_mode(WalkMode.LIMP)
+        wish(UserRequest.LIMP)
+        stop.release()
+        for _ in range(10):
+            until_mode(WalkMode.LIMP)
+        wish(UserRequest.STAND)
+        until_mode(WalkMode.STAND)

@@ -37,6 +37,18 @@ def test_a_chosen_strategy_stays_chosen() -> None:
     assert user.command.strategy == "goalkeeper"
 
 
+def test_while_an_emergency_stop_holds_nothing_but_limp_is_wanted_and_after_it_limp_still_is() -> None:
+    user = user_input()
+    user.ask(1, UserRequest.PLAY, strategy="goalkeeper")
+    user.stop(2, "emergency stop by menu (key l)")
+    assert user.command == UserCommand(2, UserRequest.LIMP, "goalkeeper", sequence=2)
+    assert user.ask(3, UserRequest.PLAY) == "emergency stop by menu (key l); release it first"
+    assert user.ask(3, UserRequest.LIMP) == ""
+    user.release()
+    assert user.command.request is UserRequest.LIMP
+    assert user.ask(4, UserRequest.STAND) == "" and user.command.request is UserRequest.STAND
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -56,6 +68,24 @@ def test_a_wish_that_cannot_be_is_refused_in_words_and_changes_nothing(
     before = user.command
     assert words in user.ask(1, **arguments)  # type: ignore[arg-type]
     assert user.command is before
+
+
+def test_a_walk_test_that_nobody_is_there_for_ends_in_a_stop_and_nothing_else_does() -> None:
+    user = user_input()
+    user.ask(1, UserRequest.WALK_TEST, velocity=(0.2, 0.0, 0.0))
+    assert user.end_walk_test(9)
+    assert user.command == UserCommand(9, UserRequest.STOP, sequence=2)
+    for request in (UserRequest.STOP, UserRequest.PLAY, UserRequest.STAND, UserRequest.KICK_TEST, UserRequest.LIMP):
+        user.ask(10, request)
+        before = user.command
+        assert not user.end_walk_test(11)
+        assert user.command is before
+
+
+@pytest.mark.parametrize("lifetime", [0.0, -1.0, math.inf, math.nan])
+def test_a_walk_test_lives_for_a_time_that_ends(lifetime: float) -> None:
+    with pytest.raises(ValueError, match="walk_test_lifetime"):
+        UserInputParameters(walk_test_lifetime=lifetime)
 
 
 def test_an_unknown_first_strategy_is_named() -> None:

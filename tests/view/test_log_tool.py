@@ -76,7 +76,7 @@ def test_nan_is_null_in_json(tmp_path: Path):
     assert json.loads(result.stdout)["pose.pose.position.x"] is None
 
 
-def test_cut_holds_exactly_the_messages_of_its_time_and_topics(recording: Path, tmp_path: Path):
+def test_cut_holds_what_was_latched_before_and_the_messages_of_its_time_and_topics(recording: Path, tmp_path: Path):
     part = tmp_path / "part"
     result = run("cut", recording, "-o", part, "-t", "world_state", "-t", "game*", "--from", "0.5", "--to", "2")
     assert result.exit_code == 0, result.stderr
@@ -85,11 +85,13 @@ def test_cut_holds_exactly_the_messages_of_its_time_and_topics(recording: Path, 
         for each in contents(recording)
         if each[0] in ("/world_state", "/game_state") and 510 * MS <= each[1] < 2010 * MS
     ]
-    assert wanted and contents(part) == wanted
+    earlier = [data for name, at, data in contents(recording) if name == "/game_state" and at < 510 * MS]
+    latched = ("/game_state", 510 * MS, earlier[-1])
+    assert wanted and contents(part) == [latched, *wanted]
 
 
 def test_merged_parts_are_the_whole_for_another_reader_too(recording: Path, tmp_path: Path):
-    for name, *choice in (("a", "--to", "1.7"), ("b", "--from", "1.7")):
+    for name, *choice in (("a", "--to", "0.3"), ("b", "--from", "0.3")):  # before anything is latched
         assert run("cut", recording, "-o", tmp_path / name, *choice).exit_code == 0
     assert run("merge", tmp_path / "b", tmp_path / "a", "-o", tmp_path / "ab").exit_code == 0
     assert sorted(contents(tmp_path / "ab")) == sorted(contents(recording))

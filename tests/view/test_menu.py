@@ -37,6 +37,7 @@ class CoreRobot:
         self.records: list[bool] = []
         self.experiments: list[bool] = []
         self.deaf = False
+        self.stops: list[str] = []
 
     def look(self) -> Sight:
         return self.sight
@@ -50,6 +51,17 @@ class CoreRobot:
 
     def tell(self, outcome: Outcome) -> None:
         self.sight = replace(self.sight, command=self.user.command, outcomes=(outcome, *self.sight.outcomes))
+
+    def emergency_stop(self, reason: str) -> None:
+        self.stops.append(reason)
+        self.user.stop(0, f"emergency stop by menu ({reason})")
+        self.sight = replace(self.sight, stop=f"emergency stop by menu ({reason})")
+        self.tell(Outcome("emergency stop", "sent"))
+
+    def release(self) -> None:
+        self.user.release()
+        self.sight = replace(self.sight, stop="")
+        self.tell(Outcome("release", "taken"))
 
     def push(self, direction: str, size: float) -> None:
         self.pushes.append((direction, size))
@@ -73,7 +85,7 @@ def test_each_key_sends_its_wish_and_the_answer_is_shown():
 
     @using(robot)
     async def _(screen: Screen) -> None:
-        for key, shown in (("s", "play: taken"), ("x", "stop: taken"), ("u", "stand: taken"), ("l", "limp: taken")):
+        for key, shown in (("s", "play: taken"), ("x", "stop: taken"), ("u", "stand: taken"), ("d", "limp: taken")):
             await screen.press(key)
             assert shown in screen.text
         assert " LIMP " in screen.text.splitlines()[2]
@@ -95,7 +107,7 @@ def test_each_key_sends_its_wish_and_the_answer_is_shown():
 
 @pytest.mark.parametrize("opened", ["", "c", "k", "p", "i"])
 @pytest.mark.parametrize("key", ["l", "L"])
-def test_limp_is_one_key_away_whatever_is_open_and_closes_it(opened: str, key: str):
+def test_the_emergency_stop_is_one_key_away_whatever_is_open_and_closes_it(opened: str, key: str):
     robot = CoreRobot()
 
     @using(robot)
@@ -104,9 +116,25 @@ def test_limp_is_one_key_away_whatever_is_open_and_closes_it(opened: str, key: s
             await screen.press(opened)
             assert "Esc leaves" in screen.text
         await screen.press(key)
-        assert "Esc leaves" not in screen.text and "limp: taken" in screen.text
+        assert "Esc leaves" not in screen.text and "emergency stop: sent" in screen.text
 
-    assert robot.wishes == [Wish(UserRequest.LIMP)]
+    assert robot.stops == ["key l"] and robot.wishes == []
+
+
+def test_an_emergency_stop_is_shown_and_holds_until_it_is_released():
+    robot = CoreRobot()
+
+    @using(robot)
+    async def _(screen: Screen) -> None:
+        await screen.press("s", "l")
+        first = " ".join(screen.text.split())
+        assert "emergency stop by menu (key l); o releases it" in first and "wish LIMP" in first
+        await screen.press("u")
+        assert "stand: refused (emergency stop by menu (key l); release it first)" in " ".join(screen.text.split())
+        await screen.press("o")
+        assert "o releases it" not in screen.text and "wish LIMP" in " ".join(screen.text.split())
+        await screen.press("u")
+        assert "stand: taken" in screen.text
 
 
 def test_walk_test_follows_the_keys_within_its_limits():
@@ -146,7 +174,7 @@ def test_speeds_that_another_face_has_chosen_are_shown_and_changed_from_there():
 
 
 @pytest.mark.parametrize("key", ["k", "p"])
-def test_keys_that_wait_for_a_question_when_limp_closes_it_have_no_effect(key: str):
+def test_keys_that_wait_for_a_question_when_a_stop_closes_it_have_no_effect(key: str):
     robot = CoreRobot()
 
     @using(robot)
@@ -160,7 +188,7 @@ def test_keys_that_wait_for_a_question_when_limp_closes_it_have_no_effect(key: s
         else:
             question.end("left")
         question.action_leave()
-        assert robot.pushes == [] and robot.wishes == [Wish(UserRequest.LIMP)]
+        assert robot.pushes == [] and robot.wishes == [] and robot.stops == ["key l"]
 
 
 def command(velocity: tuple[float, float, float], sequence: int) -> UserCommand:
@@ -262,7 +290,7 @@ def test_all_nodes_can_be_seen_on_a_small_terminal_and_words_tell_what_colours_s
         assert "recorder " not in first.split("says")[1]
         await screen.press("pagedown")
         assert "recorder" in screen.text.split("motion error:")[0]
-        assert all(f"[{key}]" in screen.text for key in "lxuscwkpri")
+        assert all(f"[{key}]" in screen.text for key in "loxudscwkpri")
 
 
 def test_without_user_input_the_remedy_is_shown_and_nothing_hangs():
@@ -274,20 +302,21 @@ def test_without_user_input_the_remedy_is_shown_and_nothing_hangs():
     async def _(screen: Screen) -> None:
         assert "error: Node user_input does not run. Start it." in screen.text
         await screen.press("w", "up", "s", "l")
+        assert robot.stops == ["key l"] and "(Node user_input does not run. Start it.)" in " ".join(screen.text.split())
         robot.deaf, robot.sight = False, replace(robot.sight, missing="")
-        await screen.press("u")
+        await screen.press("o", "u")
         assert "stand: taken" in screen.text and "does not run" not in screen.text
 
 
 @pytest.mark.parametrize("size", [(80, 24), (40, 10), (200, 60)])
-def test_any_terminal_is_large_enough_to_go_limp(size: tuple[int, int]):
+def test_any_terminal_is_large_enough_to_stop(size: tuple[int, int]):
     robot = CoreRobot()
 
     async def use(screen: Screen) -> None:
         await screen.press("l")
 
     use_menu(robot, use, size)
-    assert robot.wishes == [Wish(UserRequest.LIMP)]
+    assert robot.stops == ["key l"]
 
 
 def test_the_screen_and_its_questions_import_no_ros():

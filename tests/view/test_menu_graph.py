@@ -81,11 +81,24 @@ def test_menu_waits_for_user_input_agrees_with_a_second_face_and_goes_on_after_a
                 await screen.until_text(words)
             await screen.press("l")
             await screen.until(lambda: ears.says(UserCommand.LIMP))
-            await screen.until_text("limp: taken", "wish LIMP")
+            await screen.until_text(
+                "emergency stop: sent", "wish LIMP", "emergency stop by menu (key l); o releases it"
+            )
+            await screen.press("u")
+            await screen.until_text("stand: refused (emergency stop by menu (key l); release it first)")
+            await screen.press("o")
+            await screen.until_text("release: taken")
+            await screen.until(lambda: "o releases it" not in screen.text)
+            await screen.press("o")
+            await screen.until_text("release: refused (no emergency stop holds")
+            await screen.press("l")
         await screen.until_text("node user_input does not run", "user_input silent")
         with running(tmp_path / "second", "user_input"):
-            await screen.until_text("wish stop")
-            await screen.until(lambda: "does not run" not in screen.text.splitlines()[0])
+            # A new user_input hears of the stop from the menu.
+            await screen.until_text("wish LIMP", "emergency stop by menu")
+            await screen.until(lambda: "does not run" not in screen.text)
+            await screen.press("o")
+            await screen.until_text("release: taken")
             await screen.press("u")
             await screen.until(lambda: ears.says(UserCommand.STAND))
             await screen.until_text("stand: taken")
@@ -129,7 +142,9 @@ def test_identification_is_begun_watched_recorded_and_ended_by_limp(tmp_path: Pa
         await screen.press("i", "1")
         await screen.until_text("identification: taken", "identification 0/18, shift")
         await screen.press("l")
-        await screen.until_text("limp: taken", "identification 0/18, aborted: the user wants the robot limp")
+        await screen.until_text("identification 0/18, aborted: emergency stop by menu (key l)")
+        await screen.press("i", "1")
+        await screen.until_text("identification: refused (emergency stop by menu (key l); release it first)")
         await screen.press("r")
         await screen.until_text("end of the recording: taken", "not recording")
 

@@ -107,6 +107,8 @@ def test_keys_change_the_topic_the_screen_shows_it_and_limp_is_there_soon(tmp_pa
             assert robot.commands[-1].request == UserCommand.LIMP
             delays.append((stamp_of(robot.commands[-1]) - pressed) * 1e-9)
             until(lambda: "wish LIMP" in terminal.text and "Esc leaves" not in terminal.text)
+            terminal.press("o")
+            until(lambda: "release: taken" in terminal.text and "o releases it" not in terminal.text)
             terminal.press("u")
             until(lambda: "wish stand" in terminal.text)
         print(f"limp after {', '.join(f'{1000.0 * delay:.0f}' for delay in delays)} ms")
@@ -114,6 +116,8 @@ def test_keys_change_the_topic_the_screen_shows_it_and_limp_is_there_soon(tmp_pa
         terminal.press("w", *["Up"] * 10, "l", *["Up"] * 5)  # all at once, as from a key that is held down
         until(lambda: robot.commands[-1].request == UserCommand.LIMP)
         limp = len(robot.commands)
+        terminal.press("o")
+        until(lambda: "o releases it" not in terminal.text)
         terminal.press("w")
         until(lambda: "walk forward +0.00" in terminal.text)
         terminal.press("Up")

@@ -27,7 +27,7 @@ from tulip_ros.log_file import Log
 from tulip_ros.plan import make_plan
 from tulip_ros.run import session
 from tulip_ros.time import stamp_of
-from tulip_view.live.steer_panel import LIMP
+from tulip_view.live.steer_panel import RELEASE, STOP
 
 pytest.importorskip("viser", reason="viser is not installed: pip install -e '.[view]'")
 pytestmark = MARKS
@@ -173,7 +173,7 @@ def test_buttons_command_the_robot_and_a_browser_that_leaves_ends_the_listening(
         page = browser.new_page(viewport={"width": 1400, "height": 800})
         page.set_default_timeout(PATIENCE)
         page.goto(f"http://127.0.0.1:{port}")
-        page.get_by_role("button", name=LIMP).wait_for()
+        page.get_by_role("button", name=STOP).wait_for()
         until(listener.hears_views)
         page.evaluate(
             """() => document.addEventListener('click', (event) => {
@@ -192,7 +192,9 @@ def test_buttons_command_the_robot_and_a_browser_that_leaves_ends_the_listening(
         press("Start", UserCommand.PLAY)
         delays = []
         for _ in range(PRESSES):
-            delays.append(press(LIMP, UserCommand.LIMP))
+            delays.append(press(STOP, UserCommand.LIMP))
+            page.get_by_role("button", name=RELEASE, exact=True).click()
+            page.get_by_text("release: taken").wait_for()
             press("Stand", UserCommand.STAND)
         print(f"limp after {', '.join(f'{1000.0 * delay:.0f}' for delay in delays)} ms")
         assert statistics.median(delays) < SOON  # another program on this machine may hold back a single one
@@ -200,7 +202,8 @@ def test_buttons_command_the_robot_and_a_browser_that_leaves_ends_the_listening(
         page.keyboard.press("l")
         until(lambda: len(listener.commands) > before)
         assert listener.commands[-1].request == UserCommand.LIMP
-        page.get_by_text("limp: taken").wait_for()
+        page.get_by_text("emergency stop: sent").wait_for()
+        page.get_by_text("emergency stop by page (key l)").first.wait_for()
         page.screenshot(path=str(pictures / "view_live.png"))
         page.close()
         until(lambda: not listener.hears_views())

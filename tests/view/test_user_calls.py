@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -9,13 +10,14 @@ import pytest
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from tulip_msgs.msg import UserCommand
 from tulip_ros import asking, topics
 from tulip_ros.asking import Asker
 from tulip_ros.run import session
 from tulip_strategy.interface import UserRequest
 from tulip_strategy.user_input import Wish
 from tulip_view.outcome import Outcome
-from tulip_view.user_calls import UserCalls
+from tulip_view.user_calls import PRESENCE, UserCalls
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("ros_domain")]
 
@@ -49,7 +51,7 @@ def slow() -> Iterator[Slow]:
 
         server.create_service(topics.SET_USER_COMMAND.type, topics.SET_USER_COMMAND.name, on_wish)
         executor.add_node(server)
-        calls = UserCalls(node, Asker(node), "", told.append)
+        calls = UserCalls(node, Asker(node), "face", "", told.append)
         while not calls.reaches_user_input:
             spin(0.05)
         yield Slow(calls, asked, told, spin, executor)
@@ -91,6 +93,54 @@ def test_speeds_are_dropped_when_nobody_answers(slow: Slow, monkeypatch: pytest.
     slow.calls.wish(walk(0.3))
     slow.answer(2)
     assert [velocity for _, velocity in slow.asked] == [0.1, 0.3]  # the first was only late
+
+
+def test_a_face_gives_signs_while_the_walk_test_that_it_began_holds_and_somebody_is_there(slow: Slow):
+    signs: list[str] = []
+    robot, ears = Node("robot"), Node("ears")
+    commands = topics.USER_COMMAND.publish_from(robot)
+    topics.USER_PRESENT.subscribe_from(ears, lambda message: signs.append(message.data))
+    slow.executor.add_node(ears)
+    there = [True]
+    slow.calls._is_watched = lambda: there[0]
+
+    def signs_come() -> bool:
+        """Return whether one comes within four times the time between two."""
+        signs.clear()
+        end = time.monotonic() + 4.0 * PRESENCE
+        while time.monotonic() < end:
+            slow.spin(0.01)
+            slow.executor.spin_once(0.01)
+        return bool(signs)
+
+    def command(request: int, forward: float = 0.0) -> None:
+        commands.publish(UserCommand(request=request, velocity=[forward, 0.0, 0.0]))
+
+    while not signs:  # until they find each other
+        slow.calls._walk = [0.0, 0.0, 0.0]
+        slow.spin(0.01)
+        slow.executor.spin_once(0.01)
+    assert signs[0] == "/face"
+    slow.calls._walk = None
+    assert not signs_come()
+    slow.calls.wish(walk(0.3))
+    slow.answer(1)
+    command(UserCommand.WALK_TEST, 0.3)
+    assert signs_come()
+    there[0] = False
+    assert not signs_come()
+    there[0] = True
+    command(UserCommand.WALK_TEST, 0.2)  # another face's
+    assert not signs_come()
+    for end in (lambda: command(UserCommand.STOP), lambda: slow.calls.wish(Wish(UserRequest.STAND))):
+        told = len(slow.told)
+        slow.calls.wish(walk(0.1))
+        slow.answer(told + 1)
+        assert signs_come()
+        end()
+        assert not signs_come()
+    robot.destroy_node()
+    ears.destroy_node()
 
 
 def test_who_is_not_there_is_named_with_the_remedy(slow: Slow):

@@ -23,6 +23,7 @@ JOINT_ID = 0x200  # + number of the joint
 ORIENTATION_ID, ANGULAR_VELOCITY_ID, ACCELERATION_ID = 0x300, 0x301, 0x302
 FOOT_ID = 0x310  # + 0 left, 1 right
 BATTERY_ID = 0x320
+EMERGENCY_ID = 0x330
 NAMES = {
     COMMAND_ID: "joint command",
     JOINT_ID: "joint",
@@ -50,6 +51,9 @@ CELL_STEP = 2.0**-3  # [N] to +-4096
 BATTERY_STEPS = np.array([2.0**-8, 2.0**-8, 2.0**-14])  # voltage to 128 V, current to +-128 A, charge to 1
 UNKNOWN = -(2**15)
 """Stands for a temperature, current or charge that is not known."""
+FAULT = 2
+EMERGENCIES = {1: "its stop button is pressed", FAULT: "it has a fault"}
+"""Why a body asks for an emergency stop, by number."""
 
 
 def identity_frames(names: Sequence[str]) -> Frames:
@@ -127,6 +131,9 @@ def reading_frames(sensors: Sensors) -> Frames:
     if sensors.battery is not None:
         battery = np.array([sensors.battery.voltage, sensors.battery.current, sensors.battery.charge])
         parts.append(([BATTERY_ID], _four(battery / BATTERY_STEPS)))
+    if sensors.emergency:
+        number = next((number for number, words in EMERGENCIES.items() if words == sensors.emergency), FAULT)
+        parts.append(([EMERGENCY_ID], np.array([[number, 0.0, 0.0, 0.0]])))
     return np.concatenate([_frames(list(places), _rounded(values)) for places, values in parts])
 
 
@@ -150,6 +157,10 @@ def reading_of(packet: Packet, joints: int) -> Sensors:
         told = packet.frames["data"][packet.frames["id"] == BATTERY_ID][0, :3]
         values = [math.nan if each == UNKNOWN else each * step for each, step in zip(told, BATTERY_STEPS, strict=True)]
         battery = Battery(*values)
+    emergency = ""
+    if (packet.frames["id"] == EMERGENCY_ID).any():
+        number = int(packet.frames["data"][packet.frames["id"] == EMERGENCY_ID][0, 0])
+        emergency = EMERGENCIES.get(number, f"for its reason number {number}")
     return Sensors(
         stamp=packet.stamp,
         joint_positions=states[:, 0],
@@ -161,6 +172,7 @@ def reading_of(packet: Packet, joints: int) -> Sensors:
         foot_cells=_find(packet, FOOT_ID, 2, NAMES[FOOT_ID]).astype(float) * CELL_STEP,
         joint_temperatures=None if np.isnan(temperatures).all() else temperatures,
         battery=battery,
+        emergency=emergency,
     )
 
 

@@ -7,12 +7,14 @@ from typing import Any
 
 from std_srvs.srv import Trigger
 
+from tulip_description.emergency_stop import StopWord
 from tulip_motion.identification.experiment import Experiment
 from tulip_motion.identification.experiment_plan import FootPlan, make_plan
 from tulip_motion.identification.experiment_settings import ExperimentSettings
 from tulip_motion.messages import joint_command_to_message, progress_to_message, sensors_from_messages
 from tulip_msgs.msg import UserCommand
 from tulip_ros import topics
+from tulip_ros.emergency_stop import StopLink
 from tulip_ros.errors import BadInputError
 from tulip_ros.matching import SameStamp
 from tulip_ros.run import ComponentNode, run
@@ -30,6 +32,7 @@ class IdentifyNode(ComponentNode):
         super().__init__("identify")
         p = self._settings = self.load(ExperimentSettings())
         self._told_limp = False
+        self._emergency_stop = StopLink(self, "identify", self._on_emergency_stop)
         try:
             self._robot = p.robot
             self._plans = make_plan(self._robot, p.plan, p.posture)
@@ -77,15 +80,23 @@ class IdentifyNode(ComponentNode):
         if self._told_limp:
             self._experiment.go_limp(TOLD_LIMP)
 
+    def _on_emergency_stop(self, word: StopWord) -> None:
+        if word.engaged:
+            self._experiment.go_limp(str(word))
+
     def _make_experiment(self, plans: Sequence[FootPlan]) -> Experiment:
         """Return an experiment; without plans, one that only stands."""
         experiment = Experiment(self._robot, plans, self._settings.experiment)
+        if self._emergency_stop.engaged:
+            experiment.go_limp(str(self._emergency_stop.word))
         if self._told_limp:
             experiment.go_limp(TOLD_LIMP)
         return experiment
 
     def _on_begin(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        if self._told_limp:
+        if self._emergency_stop.engaged:
+            response.message = f"{self._emergency_stop.word}; release it first"
+        elif self._told_limp:
             response.message = "the user's last wish is limp: wish for something else first"
         elif self._experiment.is_limp:
             response.message = "the robot is limp: set it upright, and start node identify again"

@@ -14,7 +14,10 @@ from tulip_sim.bench.body import Body
 from tulip_sim.bench.runner import Bench, Row
 from tulip_sim.bench.tracking import Tracking
 from tulip_sim.bench.walk import legs
+from tulip_sim.lockstep import Settings
+from tulip_sim.match_lockstep import play_lockstep
 from tulip_sim.parameters import ENGINES, WorldParameters
+from tulip_sim.referee import Result
 from tulip_sim.timing import TICK
 
 START = Pose2D(-30.0, 10.0, 0.0)  # far from goals and ball
@@ -22,6 +25,7 @@ SEEDS = 10
 FALLING = 250  # ticks before a fall is detected whose errors say nothing of the control
 RANDOM = "random commands"
 KICK = "kick forward"
+TRIAL = "trial"
 
 # velocity, duration [s]; None is to stand
 TASKS: dict[str, tuple[Velocity | None, float]] = {
@@ -42,9 +46,11 @@ def commands(task: str, seed: int) -> Iterator[WalkCommand]:
 
 
 def measure(task: str, engine: str, seed: int) -> Row:
-    """Stand, walk or kick once."""
+    """Stand, walk, kick or play a trial once."""
     if task == KICK:
         return _kick(engine, seed)
+    if task == TRIAL:
+        return _trial(engine, seed)
     body = Body(seed, START, world=WorldParameters(engine=engine))
     body.go(0.3)
     tracking, begin = Tracking(), body.world.truth().base_position
@@ -78,6 +84,20 @@ def _kick(engine: str, seed: int) -> Row:
     return {"task": KICK, "engine": engine, "seed": seed} | {name: kicked[name] for name in names}
 
 
+def _trial(engine: str, seed: int) -> Row:
+    summary = play_lockstep(seed, settings=Settings(world=WorldParameters(engine=engine)))
+    return {
+        "task": TRIAL,
+        "engine": engine,
+        "seed": seed,
+        "outcome": summary.outcome,
+        "time [s]": round(summary.time, 1),
+        "touches": summary.touches,
+        "falls": summary.falls,
+        "localization error [m]": round(summary.localization_error, 3),
+    }
+
+
 def summarize(rows: list[Row]) -> list[str]:
     """Return a table, one line a task and engine."""
     seeds = len({row["seed"] for row in rows})
@@ -107,8 +127,10 @@ def summarize(rows: list[Row]) -> list[str]:
                 f" | {max(row['greatest torque by limit'] for row in own):.2f}"
                 f" | {min(ways):.2f} m, {np.median(ways):.2f} m |"
             )
-    kicks = [row for row in rows if row["task"] == KICK]
-    return lines + _summarize_kicks(kicks) if kicks else lines
+    for task, summarize_task in ((KICK, _summarize_kicks), (TRIAL, _summarize_trials)):
+        own = [row for row in rows if row["task"] == task]
+        lines += summarize_task(own) if own else []
+    return lines
 
 
 def _summarize_kicks(rows: list[Row]) -> list[str]:
@@ -132,10 +154,31 @@ def _summarize_kicks(rows: list[Row]) -> list[str]:
     return lines
 
 
+def _summarize_trials(rows: list[Row]) -> list[str]:
+    lines = [
+        "",
+        "Trials with camera and vision, in lockstep, the whole stack unchanged.",
+        "",
+        "| engine | goals | falls | time to goal: median, most | touches, median | localization, median |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for engine in ENGINES:
+        own = [row for row in rows if row["engine"] == engine]
+        goals = [row for row in own if row["outcome"] == Result.GOAL.value]
+        if own:
+            times = [row["time [s]"] for row in goals] or [np.nan]
+            lines.append(
+                f"| {engine} | {len(goals)} of {len(own)} | {sum(row['falls'] for row in own)}"
+                f" | {np.median(times):.1f}, {max(times):.1f} s | {np.median([row['touches'] for row in own]):.0f}"
+                f" | {np.median([row['localization error [m]'] for row in own]):.3f} m |"
+            )
+    return lines
+
+
 BENCH = Bench(
     "engines",
     "Physics engines",
-    [(task, engine, seed) for task in (*TASKS, KICK) for seed in range(SEEDS) for engine in ENGINES],
+    [(task, engine, seed) for task in (*TASKS, KICK, TRIAL) for seed in range(SEEDS) for engine in ENGINES],
     measure,
     summarize,
 )

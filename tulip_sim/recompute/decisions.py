@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from tulip_description.emergency_stop import EmergencyStop
 from tulip_description.field import Field
 from tulip_description.robot import HEAD_JOINTS, load_robot
 from tulip_motion.head import HeadMovement, HeadParameters
@@ -20,6 +21,7 @@ from tulip_motion.messages import (
     walk_command_to_message,
 )
 from tulip_ros import topics
+from tulip_ros.emergency_stop import word_from_message
 from tulip_sim.recompute.heard import OVERDUE, UNIX_TIME, Heard, Made
 from tulip_strategy.interface import GameState, UserCommand, UserRequest
 from tulip_strategy.messages import (
@@ -41,7 +43,14 @@ class StrategyStage:
     """Node strategy: a decision's stamp tells on which world state and legs' state it was made."""
 
     reads = frozenset(
-        topic.name for topic in (topics.WORLD_STATE, topics.GAME_STATE, topics.USER_COMMAND, topics.MOTION_STATE)
+        topic.name
+        for topic in (
+            topics.WORLD_STATE,
+            topics.GAME_STATE,
+            topics.USER_COMMAND,
+            topics.EMERGENCY_STOP,
+            topics.MOTION_STATE,
+        )
     )
     writes = frozenset(
         topic.name for topic in (topics.DECISION, topics.WALK_COMMAND, topics.HEAD_COMMAND, topics.BEHAVIOUR_TREE)
@@ -61,7 +70,8 @@ class StrategyStage:
         self._worlds: deque[Heard | Made] = deque()
         self._motions: deque[Heard] = deque(maxlen=KEPT)
         self._asked: deque[Heard] = deque()
-        self._wishes: deque[Heard] = deque()  # of referee and user, not taken yet
+        self._wishes: deque[Heard] = deque()  # of referee and user, not taken yet, and words of the emergency stop
+        self._stop = EmergencyStop()
         self._game: GameState | None = None
         self._user = UserCommand(0, UserRequest.STOP)
         self._told: tuple[NodeStatus, ...] = ()
@@ -109,6 +119,10 @@ class StrategyStage:
             wish = self._wishes.popleft()
             if wish.name == topics.GAME_STATE.name:
                 self._game = game_state_from_message(wish.message)
+            elif wish.name == topics.EMERGENCY_STOP.name:
+                self._stop.hear(word_from_message(wish.message), wish.log_time)
+                if self._stop.engaged:
+                    self._user = replace(self._user, request=UserRequest.LIMP)
             else:
                 self._user = user_command_from_message(wish.message)
         stamp, game = asked.stamp, self._game
@@ -117,7 +131,8 @@ class StrategyStage:
         motion = next((each for each in reversed(self._motions) if each.stamp <= stamp), None)
         state = None if motion is None else motion_state_from_message(motion.message)
         world = world_state_from_message(heard.message)
-        decision = self._strategy.decide(stamp, world, game, self._user, state)
+        user = replace(self._user, request=UserRequest.LIMP) if self._stop.engaged else self._user
+        decision = self._strategy.decide(stamp, world, game, user, state)
         for name, message in (
             (topics.WALK_COMMAND.name, walk_command_to_message(decision.walk)),
             (topics.HEAD_COMMAND.name, head_command_to_message(decision.head)),
@@ -133,7 +148,7 @@ class StrategyStage:
 class HeadStage:
     """Node head: a command's stamp tells which joint state it answers."""
 
-    reads = frozenset((topics.HEAD_COMMAND.name, topics.JOINT_STATES.name))
+    reads = frozenset((topics.HEAD_COMMAND.name, topics.JOINT_STATES.name, topics.EMERGENCY_STOP.name))
     writes = frozenset((topics.HEAD_JOINT_COMMAND.name,))
     told_by = writes
 
@@ -142,12 +157,15 @@ class HeadStage:
         self._head = HeadMovement(parameters, load_robot())
         self._command = HeadCommand(0, HeadMode.HOLD)
         self._joints: deque[Heard] = deque(maxlen=KEPT)
+        self._stop = EmergencyStop()
         self._counts: Counter[str] = Counter()
 
     def hear(self, heard: Heard | Made) -> Iterator[Made]:
         """Take a command; keep a joint state."""
         if heard.name == topics.HEAD_COMMAND.name:
             self._command = head_command_from_message(heard.message)
+        elif heard.name == topics.EMERGENCY_STOP.name and isinstance(heard, Heard):
+            self._stop.hear(word_from_message(heard.message), heard.log_time)
         elif isinstance(heard, Heard):
             self._joints.append(heard)
         yield from ()
@@ -159,8 +177,12 @@ class HeadStage:
         if joints is None:
             self._counts["head commands whose joint state is not recorded"] += 1
             return
-        angles = dict(zip(joints.message.name, joints.message.position, strict=True))
-        command = self._head.update(stamp, self._command, np.array([angles[name] for name in HEAD_JOINTS]))
+        measured = dict(zip(joints.message.name, joints.message.position, strict=True))
+        angles = np.array([measured[name] for name in HEAD_JOINTS])
+        if self._stop.engaged:
+            command = self._head.limp(stamp, angles)
+        else:
+            command = self._head.update(stamp, self._command, angles)
         yield Made(topics.HEAD_JOINT_COMMAND.name, recorded.log_time, stamp, joint_command_to_message(command))
 
     def finish(self) -> Iterator[Made]:

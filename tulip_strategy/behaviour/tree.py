@@ -48,6 +48,7 @@ def build_tree(context: Context) -> Behaviour:
             _when("penalised", context, lambda c: c.game is not None and c.game.penalty != 0, _still("stand", context)),
             _when("halted", context, lambda c: c.game is not None and c.game.halted, _still("stand still", context)),
             _when("initial", context, _in_phase(GamePhase.INITIAL), Act("stand", context, _rest)),
+            _when("blind", context, _is_blind, Act("stand", context, _rest)),
             _when("ready", context, _in_phase(GamePhase.READY), Act("go to place", context, _go_to_place)),
             _when("set", context, _in_phase(GamePhase.SET), _still("stand still", context)),
             _when("finished", context, _in_phase(GamePhase.FINISHED), Act("stand", context, _rest)),
@@ -109,6 +110,14 @@ def _in_phase(phase: GamePhase) -> Callable[[Context], bool]:
 
 def _is_fallen(context: Context) -> bool:
     return context.motion is not None and context.motion.mode is MotionMode.FALLEN
+
+
+def _is_blind(context: Context) -> bool:
+    """Return whether pictures have stopped coming: a robot that walks without seeing may walk into anything."""
+    world = context.world
+    if world is None or not world.picture:
+        return False
+    return (world.stamp - world.picture) * 1e-9 > context.parameters.blind_age
 
 
 def _limp(context: Context) -> None:

@@ -13,6 +13,7 @@ from foxglove.websocket import Capability, Parameter, StatusLevel
 
 from tulip_ros import topics
 from tulip_ros.asking import Asker
+from tulip_ros.priority import give_way
 from tulip_ros.raw_topic import RawTopic
 from tulip_ros.run import ComponentNode, run
 from tulip_ros.serialized import time_at
@@ -27,7 +28,7 @@ from tulip_view.bridge.settings import BridgeParameters
 from tulip_view.bridge.viewers import Viewers
 
 LOOK = 0.5  # [s] between two looks for new topics, services and nodes
-COLLECT = 0.02  # [s] between two times that waiting messages are passed on: one waking for many is cheap
+COLLECT = 0.04  # [s] between two times that waiting messages are passed on: one waking for many is cheap
 CAPABILITIES = [Capability.ClientPublish, Capability.Parameters, Capability.Services, Capability.Time]
 
 
@@ -63,7 +64,8 @@ class BridgeNode(ComponentNode):
             context=context,
         )
         self._offered_services = Services(self, asker, self._server)
-        self._clock_topic = RawTopic(self, topics.CLOCK.name, topics.CLOCK.type_name, topics.CLOCK.quality, waiting=1)
+        clock = topics.CLOCK
+        self._clock_topic = RawTopic(self, clock.name, clock.type_name, clock.quality, clock.quality.on_looking, 1)
         self._stamp = 0
         try:
             self.door = Door(p.host, p.port, (address, self._server.port), p.origins, self._on_refused_connection)
@@ -148,4 +150,5 @@ class BridgeNode(ComponentNode):
 
 
 if __name__ == "__main__":
+    give_way()
     run(BridgeNode)

@@ -9,8 +9,6 @@ from tulip_ros import schemas
 from tulip_ros.raw_topic import RawTopic, message_topics, offered
 from tulip_view.bridge.rules import DEFINITIONS, ENCODING
 
-WAITING = 50  # messages of one topic that wait for their turn: 0.2 s at 250 Hz
-
 
 class Feeds:
     """All topics of the graph."""
@@ -45,9 +43,10 @@ class Feeds:
         viewers.add(viewer)
         before = self._inputs.get(name)
         if before is None or before.quality.latched:  # subscribed anew, a latched topic tells its last message again
-            self._inputs[name] = RawTopic(
-                self._node, name, self._types[name], *offered(self._node, name), waiting=WAITING
-            )
+            quality, reliability = offered(self._node, name)
+            if not quality.latched:
+                reliability = quality.on_looking
+            self._inputs[name] = RawTopic(self._node, name, self._types[name], quality, reliability)
             if before is not None:
                 before.close()
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from time import time_ns
+
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
-from tulip_ros.topics import FROM_PEOPLE, is_called
+from tulip_msgs.msg import EmergencyStop
+from tulip_ros.topics import FROM_PEOPLE, RELEASE_STOP, is_called
 from tulip_view.bridge.rules import why_not_publish
 
 Source = tuple[int, int]
@@ -44,6 +47,10 @@ class Publications:
             message = deserialize_message(data, publisher.msg_type)
         except rclpy_implementation.RMWError:
             return f"{len(data)} bytes are no message of {publisher.topic_name}"
+        if isinstance(message, EmergencyStop):
+            if not message.engaged:
+                return f"an emergency stop is released by the service {RELEASE_STOP.name} alone"
+            message.by, message.sequence = message.by or "viewer", time_ns()  # viewers have heard no numbers
         publisher.publish(message)
         return ""
 

@@ -35,11 +35,12 @@ from tulip_ros import log_notes, parameters, schemas, topics
 from tulip_ros.bag_metadata import NAME as BAG_NOTES
 from tulip_ros.cdr import without_gaps
 from tulip_ros.errors import BadInputError
+from tulip_ros.latched import quality_of
 from tulip_ros.log_file import Log, files_of
 from tulip_ros.log_summary import rhythms
 from tulip_ros.plan import EVERY_NODE, make_plan, read_parameters
 from tulip_ros.recovery import recover
-from tulip_ros.replay import playable, quality_of
+from tulip_ros.replay import playable
 from tulip_ros.serialized import after_header, time_at
 from tulip_sim.recompute.settings import flattened
 from tulip_strategy.behaviour.tree import STRATEGIES

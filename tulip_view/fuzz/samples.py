@@ -260,7 +260,7 @@ def recording(
         else:
             packed = bytes(lz4.frame.compress(content)) if compression else content
             span, checksum = (chunk.first, chunk.last), crc32(content) if checked else 0
-            file.add_compressed(packed, compression, span, len(content), checksum, chunk.indices)
+            file.add_compressed([packed], compression, span, len(content), checksum, chunk.indices)
         file.add_metadata("recording", {"begun": words("2013-06-24"), "seed": words("1")})
         text = maybe(b"head: {max_speed: 2.0, pan_limits: [-1.5, 1.5]}\n")
         file.add_attachment(Attachment(0, 0, f"{PARAMETERS}head.yaml", "text/yaml", text))

@@ -47,6 +47,7 @@ INPUTS: dict[str, Input] = {
         Input(topics.DECISION, 0.2),
         Input(topics.BEHAVIOUR_TREE, without="the behaviour tree"),
         Input(topics.GAME_STATE, without="the game"),
+        Input(topics.EMERGENCY_STOP),
         Input(topics.USER_COMMAND, without="what the user wants"),
         Input(topics.DIAGNOSTICS, without="the nodes' health"),
     )

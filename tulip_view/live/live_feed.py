@@ -110,7 +110,7 @@ class LiveFeed:
         if full not in self._ears:
             seldom = topic.quality.latched or topic.quality is topics.PICTURE
             ear = replace(topic, name=full).subscribe_from(
-                self._node, lambda message: None, raw=True, depth=1 if seldom else DEPTH
+                self._node, lambda message: None, raw=True, depth=1 if seldom else DEPTH, only_looks=True
             )
             self._ears[full] = topic.name, ear
 

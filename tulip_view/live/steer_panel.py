@@ -1,4 +1,4 @@
-"""The page's left side while a robot runs: limp, start, stop, stand, tests, pushes, recordings."""
+"""The page's left side while a robot runs: emergency stop, start, stop, stand, tests, pushes, recordings."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from tulip_view.outcome import PUSHES, Outcome
 from tulip_view.user_calls import UserCalls
 
 WIDTH = 270  # [px]
-LIMP = "LIMP (emergency stop)"
-LIMP_WISH = Wish(UserRequest.LIMP)
+STOP, RELEASE = "EMERGENCY STOP", "Release"
 AS_IT_IS = "as it is"
 
 
@@ -35,15 +34,19 @@ class SteerPanel:
         gui = server.gui
         always = gui.add_panel()
         with always.add_tab("Steer"):
-            self._on(gui.add_button(LIMP, color="red", hint="Legs without stiffness, at once. Key: L"), LIMP_WISH)
+            emergency = gui.add_button(STOP, color="red", hint="No stiffness in any joint, until released. Key: L")
+            release = gui.add_button(RELEASE, hint="End the emergency stop; the robot stays limp until the next wish")
             self._on(gui.add_button("Stop", hint="Stop and stand, whatever the referee says"), Wish(UserRequest.STOP))
             self._on(gui.add_button("Stand", hint="Stand up straight"), Wish(UserRequest.STAND))
+            self._on(gui.add_button("Limp", hint="Legs without stiffness until the next wish"), Wish(UserRequest.LIMP))
             strategy = gui.add_dropdown("strategy", (AS_IT_IS, *STRATEGIES))
             start = gui.add_button("Start", color="green", hint="Obey the referee and play")
             self._answer = gui.add_html("")
         always.dock_left()
         always.set_width(WIDTH)
-        gui.add_command("Limp: legs without stiffness", hotkey="L").on_trigger(lambda _: calls().wish(LIMP_WISH))
+        emergency.on_click(lambda _: calls().emergency_stop("button"))
+        gui.add_command("Emergency stop", hotkey="L").on_trigger(lambda _: calls().emergency_stop("key l"))
+        release.on_click(lambda _: calls().release())
         tests = gui.add_panel()  # of its own: however long it is, the buttons above stay in sight
         with tests.add_tab("Test"):
             with gui.add_folder("Walk test", expand_by_default=False):

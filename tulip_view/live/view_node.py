@@ -11,6 +11,7 @@ from rclpy.node import Node
 from tulip_description.field import load_field
 from tulip_description.robot import load_robot
 from tulip_ros.asking import Asker
+from tulip_ros.priority import give_way
 from tulip_ros.run import ComponentNode, run
 from tulip_view.live.beside import PORT
 from tulip_view.live.live_feed import PICTURES, LiveFeed
@@ -93,7 +94,9 @@ class ViewNode(ComponentNode):
         robot = self._feed.robot
         with self._calls_lock:
             if robot not in self._calls:
-                self._calls[robot] = UserCalls(self, self._asker, robot, self._steer.tell)
+                self._calls[robot] = UserCalls(
+                    self, self._asker, "page", robot, self._steer.tell, lambda: bool(self._server.get_clients())
+                )
             return self._calls[robot]
 
     def _heading(self) -> float:
@@ -102,4 +105,5 @@ class ViewNode(ComponentNode):
 
 
 if __name__ == "__main__":
+    give_way()
     run(ViewNode, ViewNode.advance)

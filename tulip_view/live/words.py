@@ -13,7 +13,7 @@ from tulip_strategy.messages import tree_from_message
 from tulip_strategy.tree_drawing import SIGNS
 from tulip_strategy.tree_state import NodeStatus
 from tulip_view.live.buffers import Buffers
-from tulip_view.state_words import doing_words, game_words, wish_words
+from tulip_view.state_words import doing_words, game_words, stop_words, wish_words
 
 GREEN, YELLOW, RED, DIM = "#2b8a3e", "#b26b00", "#c92a2a", "#868e96"
 MARKS = {
@@ -32,8 +32,11 @@ SILENT = 3.0  # [s] without diagnostics, which come each second
 
 
 def game(buffers: Buffers) -> str:
-    """Return the game and the user's wish in a few lines."""
+    """Return the emergency stop if it holds, the game and the user's wish in a few lines."""
     lines = []
+    stop = buffers.newest(topics.EMERGENCY_STOP)
+    if stop is not None and stop.engaged:
+        lines.append(f'<b style="color:{RED}">{escape(stop_words(stop))}</b>')
     for title, topic, words in (
         ("user", topics.USER_COMMAND, wish_words),
         ("game", topics.GAME_STATE, game_words),

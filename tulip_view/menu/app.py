@@ -23,12 +23,12 @@ from tulip_view.menu.sight import Robot, Sight
 from tulip_view.menu.speeds import STANDING, Speeds
 
 LOOK = 0.2  # [s] between two looks at the robot
-ALWAYS = ("limp", "quit")
+ALWAYS = ("emergency_stop", "quit")
 BEGIN, END = "begin the experiment: the robot stands on one foot, then on the other", "end it: go home and stand"
 
 
 class Menu(App[None]):
-    """Shows a robot and sends what the user wants; the last wish holds when it ends."""
+    """Shows a robot and sends what the user wants; the last wish holds when it ends, but for a walk test."""
 
     ENABLE_COMMAND_PALETTE = False
     CSS = """
@@ -41,15 +41,17 @@ class Menu(App[None]):
         VerticalScroll { scrollbar-size-vertical: 1; }
     """
     # All of them before whatever has the focus: so keys that come at once are obeyed in their order, nothing can keep
-    # LIMP to itself, and no key that was pressed before it has an effect after it.
+    # EMERGENCY STOP to itself, and no key that was pressed before it has an effect after it.
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding(keys, action, priority=True)
         for keys, action in (
-            ("l,L", "limp"),
+            ("l,L", "emergency_stop"),
+            ("o", "release"),
             ("ctrl+q,ctrl+c", "quit"),
             ("s", "wish('PLAY')"),
             ("x", "wish('STOP')"),
             ("u", "wish('STAND')"),
+            ("d", "wish('LIMP')"),
             ("c", "choose_strategy"),
             ("w", "walk_test"),
             ("up", "walk(0, 1)"),
@@ -122,7 +124,7 @@ class Menu(App[None]):
         sight, walk = self._sight, (self._speeds.wanted, self._speeds.in_walk_test)
         now = sight.time if sight.time is None else int(sight.time)
         state = sight.command, sight.game, sight.doing, sight.mode, sight.reason, now, sight.recording, sight.experiment
-        self._update("headline", (sight.missing, sight.state, sight.sum), lambda: panels.headline(sight))
+        self._update("headline", (sight.missing, sight.stop, sight.state, sight.sum), lambda: panels.headline(sight))
         self._update("state", state, lambda: panels.state(sight))
         self._update("walk", walk, lambda: panels.walk(*walk))
         self._update("outcomes", (sight.outcomes, self._hint), lambda: panels.outcomes(sight, self._hint))
@@ -134,11 +136,16 @@ class Menu(App[None]):
             self._shown[name] = values
             self._parts[name].update(draw())
 
-    def action_limp(self) -> None:
-        """Make the robot limp, whatever is open."""
-        self._send(Wish(UserRequest.LIMP))
+    def action_emergency_stop(self) -> None:
+        """Stop the robot, whatever is open."""
+        self._speeds.leave()
+        self._robot.emergency_stop("key l")
         while len(self.screen_stack) > 1:
             self.pop_screen()
+
+    def action_release(self) -> None:
+        """Release the emergency stop; the robot stays limp until the next wish."""
+        self._robot.release()
 
     def action_wish(self, name: str) -> None:
         """Send a wish that needs nothing else."""

@@ -1,4 +1,4 @@
-"""Questions of the menu: a choice among few, and pushes. LIMP is one key away from here, too; see `app`."""
+"""Questions of the menu: a choice among few, and pushes. The emergency stop is one key away here, too; see `app`."""
 
 from __future__ import annotations
 

@@ -12,10 +12,11 @@ from tulip_view.menu.speeds import Velocity
 from tulip_view.state_words import wish_words
 
 STYLES = {"ok": "green", "starting": "", "warning": "bold yellow", "error": "bold red", "silent": "bold red"}
-VERDICTS = {"taken": "green", "refused": "bold red", "not done": "bold red"}
+VERDICTS = {"taken": "green", "sent": "green", "refused": "bold red", "not done": "bold red"}
 KEYS = (
-    "[l] LIMP  [x] stop  [u] stand  [s] start  [c] strategy  [w] walk test  [k] kick",
-    "[p] push  [r] record on/off  [i] identify  [PgUp PgDn] nodes  [Ctrl-Q] quit",
+    "[l] EMERGENCY STOP  [o] release  [x] stop  [u] stand  [d] limp  [s] start",
+    "[c] strategy  [w] walk test  [k] kick  [p] push  [r] record on/off  [i] identify",
+    "[PgUp PgDn] nodes  [Ctrl-Q] quit",
 )
 NO_WALK_TEST = "walk    w begins the walk test; it walks by the arrow keys, q and e"
 SHOWN_OUTCOMES = 2
@@ -23,9 +24,13 @@ SHOWN_OUTCOMES = 2
 
 def headline(sight: Sight) -> Text:
     """Return whose menu this is, and what matters most."""
+    name = f" {sight.robot or 'TUlip'} "
+    if sight.stop:
+        words = f"{sight.stop}; o releases it, the robot stays limp then"
+        lost = f" ({sight.missing})" if sight.missing else ""
+        return Text.assemble((name, "bold reverse"), " ", (words, "bold reverse red"), lost)
     words = sight.missing or sight.sum
     state = "error" if sight.missing else sight.state
-    name = f" {sight.robot or 'TUlip'} "
     return Text.assemble((name, "bold reverse"), " ", (state, STYLES[state]), f": {words}")
 
 

@@ -54,7 +54,7 @@ class RobotLink(Node):
         super().__init__(f"menu_{os.getpid()}", enable_rosout=False, start_parameter_services=False)
         self._robot = robot
         self._outcomes: deque[Outcome] = deque(maxlen=KEPT)
-        self._calls = UserCalls(self, Asker(self), robot, self._outcomes.appendleft)
+        self._calls = UserCalls(self, Asker(self), "menu", robot, self._outcomes.appendleft)
         self._health = NodeHealth(self, robot)
         self._newest: dict[str, tuple[float, bytes]] = {}  # by topic: when it came [s], and what
         for topic in LASTING:
@@ -62,7 +62,12 @@ class RobotLink(Node):
         # What comes fifty times a second waits in the middleware for the next look: to wake up for each is costly.
         self._steady = {
             topic.name: RawTopic(
-                self, self.resolve_topic_name(topic.within(robot).name), topic.type_name, topic.quality, waiting=1
+                self,
+                self.resolve_topic_name(topic.within(robot).name),
+                topic.type_name,
+                topic.quality,
+                topic.quality.on_looking,
+                waiting=1,
             )
             for topic in STEADY
         }
@@ -95,6 +100,7 @@ class RobotLink(Node):
         return Sight(
             robot=self._robot,
             missing="" if self._calls.reaches_user_input else self._why_missing(),
+            stop=str(self._calls.stop) if self._calls.stop.engaged else "",
             command=user_command_from_message(command) if command is not None else None,
             game=game_words(game) if game is not None else "",
             doing=doing_words(decision) if decision is not None else "",
@@ -105,6 +111,14 @@ class RobotLink(Node):
             outcomes=tuple(self._outcomes),
             **self._health.look(),
         )
+
+    def emergency_stop(self, reason: str) -> None:
+        """See `Robot`."""
+        self._calls.emergency_stop(reason)
+
+    def release(self) -> None:
+        """See `Robot`."""
+        self._calls.release()
 
     def wish(self, wish: Wish) -> None:
         """See `Robot`."""

@@ -56,6 +56,7 @@ class Sight:
     Attributes:
         robot: Namespace, "" for a robot that is alone.
         missing: Why nobody takes wishes, and what to do; "" while user input is there.
+        stop: The emergency stop in words, as in "emergency stop by menu (key l)"; "" while none holds.
         command: The user's wish that holds, whichever face it came from; None before the first is heard.
         game: The game in words, "" for none.
         doing: What strategy does; "" where it says nothing.
@@ -73,6 +74,7 @@ class Sight:
 
     robot: str = ""
     missing: str = ""
+    stop: str = ""
     command: UserCommand | None = None
     game: str = ""
     doing: str = ""
@@ -93,6 +95,16 @@ class Robot(Protocol):
 
     def look(self) -> Sight:
         """Return what there is to see now."""
+
+    def emergency_stop(self, reason: str) -> None:
+        """Stop the robot, whoever listens.
+
+        Args:
+            reason: In words.
+        """
+
+    def release(self) -> None:
+        """Release the emergency stop."""
 
     def wish(self, wish: Wish) -> None:
         """Tell user input."""

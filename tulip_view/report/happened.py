@@ -27,9 +27,17 @@ from tulip_view.report.figures import (
     Span,
     spans_of,
 )
+from tulip_view.state_words import stop_words
 
 TITLE = "What happened"
-TOLD_BY = (topics.GAME_STATE, topics.DECISION, topics.MOTION_STATE, topics.GROUND_TRUTH, topics.REPORT)
+TOLD_BY = (
+    topics.EMERGENCY_STOP,
+    topics.GAME_STATE,
+    topics.DECISION,
+    topics.MOTION_STATE,
+    topics.GROUND_TRUTH,
+    topics.REPORT,
+)
 KICK, TOUCH, FALL = "kick asked for", "touch of the ball", "fall"
 PHASE_COLOURS = {"initial": GREY, "ready": SKY, "set": ORANGE, "playing": GREEN, "finished": PURPLE, "penalised": RED}
 MODE_COLOURS = {"limp": GREY, "stand": SKY, "walk": GREEN, "kick": ORANGE, "fallen": RED}
@@ -51,7 +59,7 @@ def happened(recording: Recording) -> Section:
     end = recording.end
     items: list[Span | Mark] = []
     events: list[Event] = []
-    for add in (_game, _decisions, _motion, _truth, _referee):
+    for add in (_emergency_stop, _game, _decisions, _motion, _truth, _referee):
         spans, found = add(recording, end)
         items += spans
         events += found
@@ -97,6 +105,17 @@ def doing(tree: str) -> str:
     """Return what a behaviour tree's active path comes down to: its last telling name."""
     names = [name for name in tree.split(" > ") if name not in WRAPPERS]
     return names[-1] if names else ""
+
+
+def _emergency_stop(recording: Recording, end: float) -> tuple[list[Span | Mark], list[Event]]:
+    track = recording.get(topics.EMERGENCY_STOP)
+    if track is None:
+        return [], []
+    said = [message.sequence for message in track.messages]
+    first = [index for index, number in enumerate(said) if number > max(said[:index], default=0)]  # then it is repeated
+    labels = ["emergency stop" if track.messages[index].engaged else "" for index in first]
+    spans = spans_of("stop", track.times[first], labels, end, {"emergency stop": RED})
+    return [*spans], [(float(track.times[index]), "stop", stop_words(track.messages[index])) for index in first]
 
 
 def _game(recording: Recording, end: float) -> tuple[list[Span | Mark], list[Event]]:

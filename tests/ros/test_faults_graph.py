@@ -1,0 +1,60 @@
+"""Faults in a running graph: the quick ones of the bench `faults`, one after the other while the robot walks."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import pytest
+
+from tulip_msgs.msg import MotionState, UserCommand
+from tulip_ros import topics
+from tulip_ros.run import ComponentNode
+from tulip_sim.bench.free_port import free_port
+from tulip_sim.fault_table import ROWS
+from tulip_sim.fault_trial import RULES, SECOND, FaultTrial, running
+from tulip_sim.match_graph import trial_plan
+from tulip_sim.perception import PerceptionParameters
+
+pytestmark = [pytest.mark.ros, pytest.mark.sim, pytest.mark.slow, pytest.mark.usefixtures("ros_domain")]
+
+
+def ask(trial: FaultTrial, node: ComponentNode, request: int) -> None:
+    client = node.create_client(topics.SET_USER_COMMAND.type, topics.SET_USER_COMMAND.name)
+    assert trial.go_on(client.service_is_ready, 10.0)
+    answer = client.call_async(topics.SET_USER_COMMAND.type.Request(request=request))
+    assert trial.go_on(answer.done, 10.0)
+    assert answer.result().success, answer.result().message
+
+
+def stands(trial: FaultTrial, seconds: float) -> bool:
+    begin = trial.watcher.stamp
+    trial.go_on(lambda: trial.watcher.stamp > begin + seconds * SECOND, seconds + 1.0)
+    return all(each.mode == MotionState.STAND for each in trial.watcher.samples if each.stamp > begin)
+
+
+def test_killed_nodes_come_back_with_all_that_was_latched_or_known_and_a_stopped_one_lets_the_robot_stand(
+    tmp_path: Path,
+) -> None:
+    values = {"driver": {"rules": RULES, "hands": True}}
+    plan = trial_plan(1, "open", values=values, referee_port=free_port(), perception=PerceptionParameters())
+    with running(plan, tmp_path, hung=0.0) as trial:
+        for node in ("strategy", "worldmodel", "motion"):
+            killed = trial.kill(node, 0.5)
+            assert killed["safe"] and killed["plays on"], killed
+            assert trial.process(node).restarts == 1
+        # It knows the user's wish, the game and its own place: else it would not play on where it was.
+        trial.walk()
+        assert trial.watcher.observer.localization_error < 0.5
+
+        row = next(row for row in ROWS if row.name == "strategy stopped")
+        found = trial.react(row)
+        assert found["observed"] == found["stated"] and found["told"], found
+
+        ask(trial, trial.watcher, UserCommand.STOP)
+        trial.go_on(lambda: stands(trial, 0.5), 10.0)
+        trial.send("user_input", signal.SIGKILL)
+        trial.go_on(lambda: trial.process("user_input").restarts == 1, 20.0)
+        assert stands(trial, 3.0)  # though it begins with PLAY
+        ask(trial, trial.watcher, UserCommand.PLAY)
+        trial.walk()
