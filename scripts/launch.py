@@ -132,8 +132,8 @@ def keep_running(launcher: Launcher, namespace: str) -> None:
     except KeyboardInterrupt:
         console.print("all nodes ended", highlight=False)
     if launcher.given_up:
-        names = ", ".join(launcher.given_up)
-        console.print(f"error: given up, since it died again and again: {names}", style="bold red", highlight=False)
+        gone = ", ".join(launcher.given_up)
+        console.print(f"error: given up, since it died again and again: {gone}", style="bold red", highlight=False)
         raise typer.Exit(EXIT_GIVEN_UP)
 
 
