@@ -226,7 +226,8 @@ class FaultTrial:
                 restarts = self.process(row.node).restarts
                 self.go_on(lambda: self.process(row.node).restarts > restarts, HELPED)
                 begin = watcher.stamp
-            self.go_on(lambda: watcher.stamp >= begin + row.seconds * SECOND, row.seconds + 5.0)
+            # A goal ends the play, and says that the robot went on.
+            self.go_on(lambda: watcher.over or watcher.stamp >= begin + row.seconds * SECOND, row.seconds + 5.0)
             wall = time.monotonic() - wall
             samples = [sample for sample in watcher.samples if sample.stamp >= begin]
         node, words = row.tells
