@@ -1,4 +1,4 @@
-"""The option --network of all commands that join a graph."""
+"""The option --network of commands that start nodes or look at them."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ import typer
 
 from tulip_ros import network
 
-Network = Annotated[str, typer.Option(network.OPTION, metavar="PEER[,PEER]", help=network.HELP)]
+Network = Annotated[str, typer.Option(network.OPTION, metavar=network.METAVAR, help=network.HELP)]
 """What `tulip_ros.network.join` is given."""

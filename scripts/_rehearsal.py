@@ -55,6 +55,8 @@ def may_launch(starts: Sequence[Start], anyway: bool) -> bool:
     """
     p = motion_parameters(starts)
     rate = next((start.parameters.get("rate", 1.0) for start in starts if start.name == DRIVER), 1.0)
+    if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate <= 1.0:
+        raise BadInputError(f"Parameter driver.rate is {rate!r}; expected a number above 0 and at most 1.")
     walk = partial(play, everything(p), p, standing(load_robot()), rate=rate)
     return may_go(walk, EVERYTHING, anyway)
 

@@ -53,6 +53,7 @@ from tulip_sim.bench import (
     soak,
     strategy,
     stress,
+    transport,
     vision,
     walk,
 )
@@ -61,7 +62,8 @@ from tulip_view.fuzz import bench as fuzz
 
 MODULES = (
     *(strategy, challenges, match, referee, batch, walk, push, kick, odometry, control, ilc, clik, stress, engines),
-    *(simcheck, vision, localization, ball, head, latency, log, faces, faults, drivers, identify, dynamics, fuzz, soak),
+    *(simcheck, vision, localization, ball, head, latency, log, faces, faults, drivers, transport, identify, dynamics),
+    *(fuzz, soak),
 )
 BENCHES = {module.BENCH.name: module.BENCH for module in MODULES}
 DOCS = _environment.ROOT / "docs"
@@ -77,8 +79,11 @@ def chosen(bench: Bench, options: Sequence[str]) -> Bench:
         return bench
     if bench.choose is None:
         raise BadInputError(f"Bench {bench.name} has no options; leave out --option.")
+    pairs = [each.partition("=") for each in options]
+    if not all(name and sign for name, sign, _ in pairs):
+        raise BadInputError(f"--option is {', '.join(options)}; expected NAME=VALUE.")
     try:
-        return replace(bench, trials=bench.choose(dict(each.split("=", 1) for each in options)))
+        return replace(bench, trials=bench.choose({name: value for name, _, value in pairs}))
     except ValueError as error:
         raise BadInputError(f"--option of bench {bench.name}: {error}.") from error
 

@@ -38,7 +38,7 @@ def main(arguments: Sequence[str]) -> int:
         help="make or update .venv if it needs that, and remove what dead processes left in shared memory",
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.add_argument(network.OPTION, default="", metavar="PEER[,PEER]", help=network.HELP)
+    parser.add_argument(network.OPTION, default="", metavar=network.METAVAR, help=network.HELP)
     chosen = parser.parse_args(arguments)
     try:
         network.join(chosen.network)

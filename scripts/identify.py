@@ -86,6 +86,8 @@ def run(
         if mode not in MODES:
             raise BadInputError(f"--mode is {mode!r}; expected one of {', '.join(MODES)}.")
         settings = ExperimentSettings("" if body is None else str(body.absolute()), PlanParameters(postures))
+        if anyway and not rehearse:
+            raise BadInputError("--anyway is for a rehearsal; give --rehearse with it.")
         if rehearse:
             runs = mode == "graph" and driver == "none"
             present = running(load_robot()) if runs else standing(load_robot())

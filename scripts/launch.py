@@ -80,6 +80,8 @@ def main(
             with Log(log):  # says what is wrong with it before anything starts
                 values["driver"] = {"file": str(log.absolute())}
         starts = plan.make_plan(names, None if driver == "none" else driver, namespace, parameters or (), values)
+        if anyway and not rehearse:
+            raise BadInputError("--anyway is for a rehearsal; give --rehearse with it.")
         if rehearse:
             from _rehearsal import REFUSED, may_launch  # brings the simulator, which others need not wait for
 
@@ -132,8 +134,8 @@ def keep_running(launcher: Launcher, namespace: str) -> None:
     except KeyboardInterrupt:
         console.print("all nodes ended", highlight=False)
     if launcher.given_up:
-        gone = ", ".join(launcher.given_up)
-        console.print(f"error: given up, since it died again and again: {gone}", style="bold red", highlight=False)
+        given_up = ", ".join(launcher.given_up)
+        console.print(f"error: given up, since it died again and again: {given_up}", style="bold red", highlight=False)
         raise typer.Exit(EXIT_GIVEN_UP)
 
 

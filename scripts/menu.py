@@ -24,7 +24,7 @@ def main(
     namespace: Annotated[str, typer.Option(help="Namespace of the robot, as in striker.")] = "",
     peers: Network = "",
 ) -> None:
-    """Start, stop, walk test, kick test, push, record, identify, health of the nodes; key l makes the legs limp."""
+    """Start, stop, walk test, kick test, push, record, identify, health of the nodes; key l is the emergency stop."""
     try:
         network.join(peers)
         with linked(check_namespace(namespace)) as robot:

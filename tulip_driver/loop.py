@@ -50,7 +50,6 @@ class BodyLoop:
     ) -> None:
         self._body, self._clock = body, clock
         self._guard, self._limiter = Guard(robot, parameters), Limiter(robot, rate)
-        self._too_old = parameters.time_to_live * MILLISECOND
         n = len(robot.joint_names)
         self._shapes = {
             "joint_positions": (n,),
@@ -105,11 +104,11 @@ class BodyLoop:
         """Take a command for a group of joints; return "" or why it is not taken."""
         if self.sensors is None:
             return "no reading of the body has come yet; expected a command that answers one"
-        age = self.sensors.stamp - command.stamp
-        if age > self._too_old or age < 0:
+        age, life = self.sensors.stamp - command.stamp, self._guard.life(command.names)
+        if age > life or age < 0:
             return (
                 f"it answers sensors of {command.stamp} ns, the newest are of {self.sensors.stamp} ns; expected them or"
-                f" older ones by {self._too_old / MILLISECOND:.0f} ms at most"
+                f" older ones by {life / MILLISECOND:.0f} ms at most"
             )
         return self._guard.accept(command, self.now)
 

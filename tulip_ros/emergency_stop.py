@@ -97,9 +97,9 @@ class StopLink:
         with self._lock:
             held = self.engaged
             if self._stop.hear(word, time.time_ns()):
-                self._tell()
                 if held or self.engaged:
                     self._obey(self.word)
+                self._tell()
 
     def _stamp(self) -> int:
         return 0 if self._clock is None else int(self._clock.now().nanoseconds)

@@ -21,6 +21,7 @@ from tulip_ros import transport
 from tulip_ros.errors import BadInputError
 
 OPTION = "--network"
+METAVAR = "PEER[,PEER]"
 HELP = "The graph's other computers, which it is opened to: addresses or names, as in 192.168.8.2,robot.local."
 PEERS_VARIABLE = "ROS_STATIC_PEERS"
 DOMAIN_VARIABLE = "ROS_DOMAIN_ID"

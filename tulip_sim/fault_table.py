@@ -120,7 +120,7 @@ ROWS: tuple[Row, ...] = (
     _stopped(
         "motion",
         LIMP,
-        "the driver damps the legs after 0.1 s and lets go of them after 0.6 s" + AGAIN,
+        "the driver damps the legs after 0.04 s and lets go of them 0.5 s later" + AGAIN,
         ("driver", "commands of the legs outlived"),
         seconds=4.0,  # then people set it up
     ),

@@ -145,7 +145,7 @@ def test_a_body_whose_clock_rules_and_whose_readings_are_lost_is_damped_by_the_w
     lost = loop.sensors
     loop.tick()
     body.exchange = lambda told: body.told.append(told) or replace(lost, joint_efforts=np.full(14, np.nan))  # type: ignore
-    for milliseconds, stiffness in ((900, 100.0), (1080, 100.0), (1110, 0.0)):
+    for milliseconds, stiffness in ((900, 100.0), (1000 + LIFE - 10, 100.0), (1000 + LIFE + 10, 0.0)):
         wall.now = milliseconds * MILLISECOND
         loop.tick()
         assert told(body).stiffness[0] == stiffness, milliseconds

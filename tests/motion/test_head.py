@@ -237,3 +237,15 @@ def test_robot_without_head_is_refused() -> None:
 def test_parameters_out_of_range_are_refused_by_name(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         HeadParameters(**wrong)
+
+
+def test_a_limp_head_has_no_stiffness_and_afterwards_begins_where_it_hangs() -> None:
+    head = HeadMovement(HeadParameters(), ROBOT)
+    command = HeadCommand(10**9, HeadMode.LOOK_AT, (1.0, 1.0, 0.0))
+    before = drive(head, command, 1.0)[-1]
+    hanging = np.array([0.0, 0.6])
+    limp = head.limp(before.stamp + PERIOD, hanging)
+    assert limp.sequence == before.sequence + 1 and limp.names == HEAD_JOINTS
+    assert not np.any([limp.stiffness, limp.damping, limp.effort])
+    after = head.update(limp.stamp + PERIOD, command, hanging)
+    assert after.position == pytest.approx(hanging) and after.stiffness.all()

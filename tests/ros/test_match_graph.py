@@ -105,7 +105,7 @@ def test_whole_recording_of_a_trial_is_read_by_another_reader_and_computed_anew(
     summary = play_graph(1, "open", tmp_path / "trial", values=values, referee_port=free_port(), logs=tmp_path)
     assert summary.outcome == "time"
     of_others = (topics.START_POSE, topics.REPORT, topics.BATTERY)  # of matches, real bodies
-    of_people = (topics.USER_WISH, topics.USER_PRESENT)
+    of_people = (topics.USER_WISH, topics.USER_PRESENT, topics.EMERGENCY_STOP)
     of_tools = (topics.DIAGNOSTICS_AGG, topics.MARKERS, topics.IDENTIFICATION)
     kept = [topic for topic in topics.TOPICS if topic not in (topics.VISION_PICTURE, *of_others, *of_people, *of_tools)]
     counts: dict[str, int] = {}

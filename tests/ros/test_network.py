@@ -14,10 +14,12 @@ from xml.etree import ElementTree
 import _installation as installation
 import doctor
 import pytest
+from rclpy.node import Node
 
 from tulip_ros import network, transport
 from tulip_ros.errors import BadInputError
 from tulip_ros.nodes import LOOKERS, NODES
+from tulip_ros.run import session
 
 WORDS = {  # with nothing asked of the network
     "10.0.0": "'10.0.0' is no address",
@@ -194,6 +196,18 @@ def test_ports_of_domains_do_not_overlap_and_follow_the_standard() -> None:
 
 def test_nodes_that_only_look_are_nodes_and_none_of_them_plays() -> None:
     assert LOOKERS and not any(NODES[name].playing for name in LOOKERS)
+
+
+@pytest.mark.ros
+def test_what_nodes_listen_on_is_bound_to_loopback_by_default(ros_domain: int) -> None:
+    with session(lambda: Node("listener"), ["test"], handle_signals=False):
+        inodes = {os.readlink(path) for path in Path("/proc/self/fd").iterdir() if path.exists()}
+        lines = [line.split() for line in Path("/proc/self/net/udp").read_text().splitlines()[1:]]
+        own = [fields[1].split(":") for fields in lines if f"socket:[{fields[9]}]" in inodes]
+    # Sockets at other ports are those that it sends from.
+    listened = [network.domain_ports(ros_domain), network.GRAPH_PORTS]
+    bound = [address for address, port in own if any(each.first <= int(port, 16) <= each.last for each in listened)]
+    assert len(bound) >= 2 and set(bound) == {"0100007F"}
 
 
 @pytest.mark.ros

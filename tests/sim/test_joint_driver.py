@@ -72,10 +72,10 @@ def test_old_command_means_damping_only_and_then_limp() -> None:
     under_test = driver()
     under_test.accept(command(effort=5.0, stiffness=100.0, position=0.5), 0)
     speed = np.full(14, 0.5)
-    assert under_test.torques(99 * MILLISECOND, START, speed)[KNEE] == pytest.approx(55.0)
-    assert under_test.torques(100 * MILLISECOND, START, speed)[KNEE] == pytest.approx(-0.5 * 4.0)
-    assert under_test.torques(599 * MILLISECOND, START, speed)[KNEE] == pytest.approx(-0.5 * 4.0)
-    np.testing.assert_array_equal(under_test.torques(600 * MILLISECOND, START, speed)[:12], 0.0)
+    assert under_test.torques(39 * MILLISECOND, START, speed)[KNEE] == pytest.approx(55.0)
+    assert under_test.torques(40 * MILLISECOND, START, speed)[KNEE] == pytest.approx(-0.5 * 4.0)
+    assert under_test.torques(539 * MILLISECOND, START, speed)[KNEE] == pytest.approx(-0.5 * 4.0)
+    np.testing.assert_array_equal(under_test.torques(540 * MILLISECOND, START, speed)[:12], 0.0)
 
 
 def test_time_out_of_the_legs_leaves_the_head_alone() -> None:
@@ -146,9 +146,10 @@ def test_joints_are_silent_once_their_last_command_outlived_its_time_to_live() -
     assert under_test.silent_joints(10**12) == ()  # nobody ever commanded them: they hold the start posture
     under_test.accept(command(LEG_JOINTS), 0)
     under_test.accept(command(HEAD_JOINTS), 50 * MILLISECOND)
-    live = DriverParameters().time_to_live
+    live, head = DriverParameters().time_to_live, DriverParameters().head_time_to_live
     assert under_test.silent_joints((live - 1) * MILLISECOND) == ()
     assert under_test.silent_joints(live * MILLISECOND) == LEG_JOINTS
-    assert under_test.silent_joints((live + 50) * MILLISECOND) == LEG_JOINTS + HEAD_JOINTS
+    assert under_test.silent_joints((head + 49) * MILLISECOND) == LEG_JOINTS
+    assert under_test.silent_joints((head + 50) * MILLISECOND) == LEG_JOINTS + HEAD_JOINTS
     under_test.accept(command(LEG_JOINTS, sequence=2), 200 * MILLISECOND)
     assert under_test.silent_joints(200 * MILLISECOND) == HEAD_JOINTS

@@ -40,6 +40,7 @@ NOT_IN_LOCKSTEP = {
     topics.REPORT,
     topics.USER_WISH,  # nobody is there to wish
     topics.USER_PRESENT,
+    topics.EMERGENCY_STOP,
     topics.DIAGNOSTICS_AGG,
     topics.IDENTIFICATION,  # in the experiment alone
     topics.MARKERS,

@@ -20,6 +20,7 @@ from tulip_description.planar import Pose2D
 from tulip_motion.interface import HeadCommand, HeadMode, MotionMode, WalkCommand, WalkMode
 from tulip_motion.messages import motion_state_to_message
 from tulip_ros import topics
+from tulip_ros.emergency_stop import StopLink
 from tulip_ros.errors import BadInputError
 from tulip_ros.finding import Level
 from tulip_ros.run import session
@@ -265,3 +266,39 @@ def test_strategy_publishes_commands_and_sends_the_kick_as_an_action() -> None:
         assert heads[-1].mode == HeadMode.LOOK_AT
         client.destroy()
         server.destroy()
+
+
+def test_strategy_wants_limp_legs_while_an_emergency_stop_holds_and_after_it_until_the_users_next_wish() -> None:
+    with running(StrategyNode) as (node, until):
+        walks: list[Any] = []
+        topics.WALK_COMMAND.subscribe_from(node, walks.append)
+        worlds, user = (topic.publish_from(node) for topic in (topics.WORLD_STATE, topics.USER_COMMAND))
+        until(lambda: bool(worlds.get_subscription_count() and user.get_subscription_count()))
+        stop = StopLink(node, "tester")
+
+        def wish(request: UserRequest) -> None:
+            user.publish(user_command_to_message(UserCommand(0, request, velocity=(0.2, 0.0, 0.0))))
+
+        def until_mode(mode: WalkMode) -> None:
+            """Let strategy decide until it wants that."""
+            for tick in range(1000):
+                seen = len(walks)
+                worlds.publish(world_state_to_message(world(10**9 + tick * 20_000_000)))
+                until(lambda seen=seen: len(walks) > seen)  # type: ignore[misc]
+                if walks[-1].mode == mode:
+                    return
+            raise AssertionError(f"it did not come to want {mode.name}")
+
+        wish(UserRequest.WALK_TEST)
+        until_mode(WalkMode.WALK)
+        stop.engage("a test")
+        until_mode(WalkMode.LIMP)
+        wish(UserRequest.WALK_TEST)  # of a user input that has not heard of the stop yet
+        for _ in range(10):
+            until_mode(WalkMode.LIMP)
+        wish(UserRequest.LIMP)
+        stop.release()
+        for _ in range(10):
+            until_mode(WalkMode.LIMP)
+        wish(UserRequest.STAND)
+        until_mode(WalkMode.STAND)

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from kinematic_bench import game_state, motion_state, seen_object
+from py_trees.blackboard import Blackboard
 from rich.console import Console
 
 from tulip_description.field import load_field
@@ -89,3 +90,10 @@ def test_a_diagram_draws_each_node_of_its_branch_once() -> None:
     assert all(text.count(f"    n{index}[") + text.count(f"    n{index}([") == 1 for index in inside)
     assert state.kinds[root] is NodeKind.SELECTOR
     assert mermaid(state, 0, depth=1).count("-->") == sum(parent == 0 for parent in state.parents)
+
+
+def test_a_tree_that_is_not_used_any_more_leaves_nothing_behind() -> None:
+    before = len(Blackboard.clients)  # py_trees keeps them in its class, for ever
+    for _ in range(3):
+        Strategy(StrategyParameters(), FIELD)
+    assert len(Blackboard.clients) == before

@@ -37,6 +37,18 @@ def test_a_chosen_strategy_stays_chosen() -> None:
     assert user.command.strategy == "goalkeeper"
 
 
+def test_while_an_emergency_stop_holds_nothing_but_limp_is_wanted_and_after_it_limp_still_is() -> None:
+    user = user_input()
+    user.ask(1, UserRequest.PLAY, strategy="goalkeeper")
+    user.stop(2, "emergency stop by menu (key l)")
+    assert user.command == UserCommand(2, UserRequest.LIMP, "goalkeeper", sequence=2)
+    assert user.ask(3, UserRequest.PLAY) == "emergency stop by menu (key l); release it first"
+    assert user.ask(3, UserRequest.LIMP) == ""
+    user.release()
+    assert user.command.request is UserRequest.LIMP
+    assert user.ask(4, UserRequest.STAND) == "" and user.command.request is UserRequest.STAND
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

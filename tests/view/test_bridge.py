@@ -16,13 +16,14 @@ import pytest
 from foxglove_viewer import Viewer, serialized
 from mcap_ros2._dynamic import generate_dynamic
 from ports import free_port
+from rclpy.serialization import serialize_message
 from rosbags.typesys import get_types_from_msg
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from websockets.exceptions import InvalidStatus
 
-from tulip_msgs.msg import UserCommand
+from tulip_msgs.msg import EmergencyStop, UserCommand
 from tulip_ros import schemas, topics
 from tulip_ros.run import ComponentNode, session
 from tulip_ros.time import header, to_message
@@ -211,15 +212,28 @@ def test_published_wish_holds_then(graph: Graph):
         viewer.until(lambda: graph.node.count_publishers("/user_wish") == 0)
 
 
+def test_a_viewer_engages_the_emergency_stop_by_topic_but_releases_it_by_service_alone(graph: Graph):
+    def stop(engaged: bool) -> bytes:
+        return bytes(serialize_message(EmergencyStop(engaged=engaged, reason="a button")))
+
+    with graph.viewer() as viewer:
+        viewer.advertise(1, "/emergency_stop", "tulip_msgs/msg/EmergencyStop")
+        viewer.until(lambda: graph.node.count_publishers("/emergency_stop") == 2)  # the other one is user input's
+        time.sleep(0.5)  # for user input to find the new publisher
+        viewer.publish(1, stop(True))
+        viewer.until(lambda: graph.node.commands[-1].request == UserCommand.LIMP)
+        viewer.publish(1, stop(False))
+        viewer.until(lambda: [each for each in viewer.said("status") if "released by the service" in each["message"]])
+        refused = viewer.call("/stand")
+        assert not refused.success and refused.message == "emergency stop by viewer (a button); release it first"
+        assert viewer.call("/release_emergency_stop").success
+        assert viewer.call("/stand").success
+
+
 @pytest.mark.parametrize(
     ("topic", "type_name", "encoding", "words"),
     [
-        (
-            "/legs/joint_command",
-            "tulip_msgs/msg/JointCommand",
-            "cdr",
-            "only user_wish and emergency_stop and initialpose are",
-        ),
+        ("/legs/joint_command", "tulip_msgs/msg/JointCommand", "cdr", "only user_wish, emergency_stop and initialpose"),
         ("/user_command", "tulip_msgs/msg/UserCommand", "cdr", "is not for viewers to publish"),
         ("/user_wish", "std_msgs/msg/String", "cdr", "expected tulip_msgs/msg/UserCommand"),
         ("/user_wish", "tulip_msgs/msg/UserCommand", "json", "expected cdr"),

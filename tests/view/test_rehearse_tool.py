@@ -113,6 +113,21 @@ def test_launch_starts_nothing_beyond_the_limits_unless_told(
     assert "--anyway" in result.output
 
 
+@pytest.mark.parametrize("rate", [0.0, 2.0, "slow", True, float("nan")])
+def test_a_pace_that_no_driver_can_have_is_refused(rate: object) -> None:
+    with pytest.raises(BadInputError, match=r"driver\.rate is .*; expected a number above 0"):
+        _rehearsal.may_launch(make_plan((), "echo", values={"driver": {"rate": rate}}), anyway=True)
+
+
+@pytest.mark.parametrize(("tool", "arguments"), [("launch", []), ("identify", ["run"])])
+def test_anyway_alone_is_refused(tool: str, arguments: list[str]) -> None:
+    app = identify_tool.app if tool == "identify" else typer.Typer()
+    if tool == "launch":
+        app.command()(launch_tool.main)
+    result = CliRunner().invoke(app, [*arguments, "--anyway"])
+    assert result.exit_code == 2 and "give --rehearse with it" in result.output
+
+
 @pytest.mark.sim
 def test_launch_rehearses_with_the_driver_s_own_pace(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_rehearsal, "everything", lambda parameters: (Part("walk 0.3 0 0", 5.0, (0.3, 0.0, 0.0)),))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from functools import partial
 from textwrap import shorten
@@ -10,14 +10,18 @@ from textwrap import shorten
 import numpy as np
 from numpy.typing import NDArray
 
+from tulip_description.robot import HEAD_JOINTS, LEG_JOINTS
 from tulip_description.robot_io import JointCommand
 from tulip_driver.check.rig import Rig
 from tulip_driver.check.rows import Row, judged, skipped
 from tulip_driver.contract import BodyError
 from tulip_driver.guard import MILLISECOND
+from tulip_driver.parts import by_parts
 
 Array = NDArray[np.float64]
-DAMPED_WITHIN = 50.0  # [ms] after a command's time-to-live
+DAMPED_WITHIN = 10.0  # [ms] after a command to the legs has lived: 50 ms after the last one
+THEN_WITHIN = 50.0  # [ms] the same for the head, and for what comes later
+GONE_WITHIN = 50.0  # [ms] after the request
 LIMP_WITHIN = 20.0  # [ms] after the request
 WRONG = 0.05  # [rad] off: no harm, should such a command be obeyed after all
 STILL = 0.02  # [rad] that garbage may move a joint
@@ -107,9 +111,7 @@ def check_limp(rig: Rig, home: Array) -> Iterator[Row]:
         if (np.abs(reading.joint_efforts) > limits).any()
     ]
     last = max(still, default=0.0)
-    yield judged(
-        "limp: torque gone, measured", f"after {last:.1f} ms", f"{DAMPED_WITHIN:.0f} ms", last <= DAMPED_WITHIN
-    )
+    yield judged("limp: torque gone, measured", f"after {last:.1f} ms", f"{GONE_WITHIN:.0f} ms", last <= GONE_WITHIN)
     refused = rig.command(home)
     yield judged("limp: lasts", f"command {'refused' if refused else 'taken'}", "refused", bool(refused))
     rig.loop.release()
@@ -121,22 +123,30 @@ def check_limp(rig: Rig, home: Array) -> Iterator[Row]:
 
 def check_silence(rig: Rig) -> Iterator[Row]:
     """Yield the lines about commands that stop to come."""
+    yield from rig.undisturbed(partial(_check_silence, rig))
+
+
+def _check_silence(rig: Rig) -> Iterator[Row]:
     assert rig.loop.sensors is not None
     present = rig.loop.sensors.joint_positions
     rig.hold(0.3, lambda _: present)
     begin, p = rig.loop.now, rig.parameters
     rig.command(present)
-    rig.wait((p.time_to_live + p.damping_time + 200) * 1e-3)
-    ages = [((at - begin) / MILLISECOND, order) for at, order in rig.probe.told]
-    never = float("inf")
-    damped = min((age for age, order in ages if not _values(order, "stiffness").any()), default=never)
-    limp = min((age for age, order in ages if not _values(order, "stiffness", "damping").any()), default=never)
-    for what, age, due in (
-        ("silence: damping", damped, p.time_to_live),
-        ("silence: limp", limp, p.time_to_live + p.damping_time),
-    ):
-        expected = f"{due} ms, within {DAMPED_WITHIN:.0f} ms"
-        yield judged(what, f"after {age:.0f} ms", expected, due - 1e-6 <= age <= due + DAMPED_WITHIN)
+    rig.wait((p.time_to_live + p.head_time_to_live + p.damping_time + 200) * 1e-3)
+    for part, joints, life in (("legs", LEG_JOINTS, p.time_to_live), ("head", HEAD_JOINTS, p.head_time_to_live)):
+        told = [((at - begin) / MILLISECOND, own) for at, order in rig.probe.told if (own := _part(order, joints))]
+        damped = min((age for age, own in told if not _values(own, "stiffness").any()), default=float("inf"))
+        limp = min((age for age, own in told if not _values(own, "stiffness", "damping").any()), default=float("inf"))
+        for what, age, due in (("damped", damped, life), ("limp", limp, life + p.damping_time)):
+            late = DAMPED_WITHIN if (part, what) == ("legs", "damped") else THEN_WITHIN
+            expected = f"{due} ms, within {late:.0f} ms"
+            in_time = due - 1e-6 <= age <= due + late
+            yield judged(f"silence: {part} {what}", f"after {age:.0f} ms", expected, in_time)
+
+
+def _part(order: JointCommand, joints: Collection[str]) -> JointCommand | None:
+    """Return what an order says to some joints; None if nothing."""
+    return next((part for part in by_parts(order) if set(part.names) <= set(joints)), None)
 
 
 def check_stop(rig: Rig) -> Iterator[Row]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 
 import numpy as np
 
 from tulip_description.planar import Pose2D
 from tulip_description.robot import Robot
-from tulip_description.robot_io import JointCommand
+from tulip_description.robot_io import JointCommand, Sensors
 from tulip_motion.interface import MotionMode, WalkCommand, WalkMode
 from tulip_motion.motion import Motion
 from tulip_motion.parameters import MotionParameters
@@ -75,6 +76,22 @@ class Body:
         if speed > self.ball_speed:
             self.ball_speed = speed
             self.ball_direction = math.atan2(float(truth.ball_linear_velocity[1]), float(truth.ball_linear_velocity[0]))
+
+    def stall(self, command: WalkCommand, milliseconds: int, waiting: int) -> None:
+        """Let time pass without motion control, which then answers at once the newest readings that wait for it.
+
+        Args:
+            command: That it has then.
+            milliseconds: How long.
+            waiting: How many readings wait; older ones are lost.
+        """
+        readings: deque[Sensors] = deque(maxlen=waiting)
+        for _ in range(milliseconds // TICK):
+            readings.append(self.world.sensors())
+            self.world.advance(TICK)
+        self.motion.command(command)
+        for reading in readings:
+            self._pending = self.motion.tick(reading)
 
     def go(self, seconds: float, velocity: tuple[float, float, float] | None = None) -> None:
         """Walk with a velocity, or stand, for a time [s], or until the robot falls."""

@@ -12,7 +12,7 @@ import importlib.util
 import select
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
@@ -34,6 +34,7 @@ from tulip_ros.plan import make_plan
 from tulip_ros.run import ComponentNode, session
 from tulip_ros.time import stamp_of
 from tulip_sim.bench import drivers_bodies
+from tulip_sim.bench.drivers_stalls import TIME, upright_time
 from tulip_sim.bench.free_port import free_port, own_domain
 from tulip_sim.bench.runner import Bench, Row
 from tulip_sim.simulated_body import SimulatedBody
@@ -50,6 +51,8 @@ AT_REST = 0.1  # [rad/s]
 PATIENCE = 60.0  # [s] for what takes a second
 STEADY = 25  # readings at rest before a try
 CHECK = "check"
+STALLS = "stalls"
+LIVES, STALL_TIMES, WALKS = (40, 100), (60, 92, 140), 6  # [ms] and [ms]; walks of each
 LISTENED = {"echo": drivers_bodies.ToldEcho, "wire": drivers_bodies.ToldWire}
 """Drivers whose bodies tell when they are told to have no stiffness."""
 SOON = 1.0  # [s] in which that must have come
@@ -110,14 +113,17 @@ def measure(driver: str, number: int | str) -> Row:
     """Try each way of stopping some times, or check the driver.
 
     Args:
-        driver: One of `DRIVERS`.
-        number: Of the round, or CHECK.
+        driver: One of `DRIVERS`, or STALLS for what a walk makes of late commands.
+        number: Of the round, or CHECK; or the seed of a walk.
 
     Raises:
         RuntimeError: if a process ends or the torque does not come or go.
     """
-    own_domain()
     row: Row = {"driver": driver, "round": number}
+    if driver == STALLS:
+        walks = [(life, stall, upright_time(life, stall, int(number))) for stall in STALL_TIMES for life in LIVES]
+        return row | {f"life {life} ms, stalls of {stall} ms: upright [s]": time for life, stall, time in walks}
+    own_domain()
     if driver == "mujoco" and importlib.util.find_spec("mujoco") is None:
         return row | {"left out": "MuJoCo is not installed"}
     if number == CHECK:
@@ -190,8 +196,8 @@ def running(driver: str, report: int) -> Iterator[tuple[Commander, Until]]:
     """
     port = free_port()
     simulated = {"camera": False, "referee": False, "mode": "free", "wait_for": ["user_input"]}
-    nodes, name = ["user_input"], "sim"
-    values: dict[str, dict[str, Any]] = {"driver": {**simulated, "world": {"engine": _engine(driver)}}}
+    nodes, name = ["user_input"], driver
+    values: dict[str, dict[str, Any]] = {"driver": dict(simulated)}
     if driver in LISTENED:
         name = f"{drivers_bodies.__name__}:{LISTENED[driver].__name__}"
         values = {"driver": {"options": [f"report={report}"]}}
@@ -217,10 +223,6 @@ def running(driver: str, report: int) -> Iterator[tuple[Commander, Until]]:
         yield commander, until
 
 
-def _engine(driver: str) -> str:
-    return "mujoco" if driver == "mujoco" else "pybullet"
-
-
 def _check(driver: str) -> Row:
     """Return the verdict of the contract's test kit."""
     robot, port = load_robot(), free_port()
@@ -232,10 +234,10 @@ def _check(driver: str) -> Row:
         elif driver == "wire":
             body = WireBody(robot, port=port, patience=PATIENCE)
         else:
-            body = SimulatedBody(robot, harness=True, engine=_engine(driver))
+            body = SimulatedBody(robot, harness=True, engine="mujoco" if driver == "mujoco" else "pybullet")
         rows = list(check_driver(body, robot, lambda: True))
     return {
-        "checks": len(rows),
+        "checks": sum(each.judgement is not Judgement.SKIPPED for each in rows),
         "passed": sum(each.judgement is Judgement.PASS for each in rows),
         "failed": [f"{each.what}: {each.measured}" for each in rows if each.judgement is Judgement.FAIL],
         "verdict": verdict(rows)[1],
@@ -267,6 +269,21 @@ def summarize(rows: list[Row]) -> list[str]:
                 f"| {driver} | {checks or '-'} | {len(tries[0])} | {until} | {' | '.join(map(_told, tries))} |"
             )
     lines += [f"- {row['driver']} fails {what}" for row in rows for what in row.get("failed", ())]
+    walks = [row for row in rows if row["driver"] == STALLS]
+    if not walks:
+        return lines
+    lines += [
+        "",
+        f"Why commands live {life} ms: a walk at 0.5 m/s whose motion control does nothing at all for a while, about"
+        f" once a second, for {TIME / 1000:.0f} s; how many of {len(walks)} robots stay upright.",
+        "",
+        f"| commands live | {' | '.join(f'stalls of {stall} ms' for stall in STALL_TIMES)} |",
+        f"| --- {'| --- ' * len(STALL_TIMES)}|",
+    ]
+    for each in LIVES:
+        names = [f"life {each} ms, stalls of {stall} ms: upright [s]" for stall in STALL_TIMES]
+        upright = [str(sum(row[name] >= TIME / 1000 for row in walks)) for name in names]
+        lines.append(f"| {each} ms | {' | '.join(upright)} |")
     return lines
 
 
@@ -274,11 +291,32 @@ def _told(times: list[float]) -> str:
     return f"{np.median(times):.1f} ms, {max(times):.1f} at most" if times else "-"
 
 
+def choose(options: Mapping[str, str]) -> list[tuple[str, int | str]]:
+    """Return what is tried.
+
+    Args:
+        options: rounds of tries; drivers, with commas between; walks of each kind with stalls.
+
+    Raises:
+        ValueError: for other options, or values that cannot be used.
+    """
+    known = {"rounds": str(ROUNDS), "drivers": ",".join(DRIVERS), "walks": str(WALKS)}
+    if not options.keys() <= known.keys():
+        raise ValueError(f"options are {', '.join(options)}; expected some of {', '.join(known)}")
+    chosen = known | dict(options)
+    drivers = chosen["drivers"].split(",")
+    if not set(drivers) <= set(DRIVERS):
+        raise ValueError(f"drivers are {chosen['drivers']}; expected some of {','.join(DRIVERS)}")
+    trials = [(driver, number) for number in (CHECK, *range(1, int(chosen["rounds"]) + 1)) for driver in drivers]
+    return [*trials, *((STALLS, seed) for seed in range(int(chosen["walks"])))]
+
+
 BENCH = Bench(
     "drivers",
     "Time-out and emergency stop of the drivers",
-    [(driver, number) for number in (CHECK, *range(1, ROUNDS + 1)) for driver in DRIVERS],
+    choose({}),
     measure,
     summarize,
     workers=1,
+    choose=choose,
 )

@@ -27,6 +27,7 @@ HOURS, MINUTES = 8.0, 30.0  # of lockstep and of a graph, simulated
 FOLDER = Path(__file__).parents[2] / "recordings" / "soak"
 CHUNK = 0.25  # [h] of lockstep in one row
 WARM_UP = {lockstep.MODE: 0.5, graph.MODE: 1.0 / 12.0}  # [h] of each process that is left out of the slopes
+OF_NODES = (MEMORY, FILES, THREADS, graph.SERVICE, graph.PROCESSOR)
 PERIOD = 8.0  # [h] for which the growth is told
 
 
@@ -137,7 +138,7 @@ def _of_lockstep(segments: list[list[Sample]]) -> list[str]:
         f"Lockstep, one process that plays match after match: {hours:.2f} hours in {len(segments)} processes,"
         f" {len(ended)} whole matches with {counts}; a sample each minute, warm-up {WARM_UP[lockstep.MODE]:.1f} h."
     )
-    figures = (*(MEMORY, FILES, THREADS, lockstep.SHARED, lockstep.OBJECTS, lockstep.PROCESSOR, lockstep.WALL),)
+    figures = (MEMORY, FILES, THREADS, lockstep.SHARED, lockstep.OBJECTS, lockstep.PROCESSOR, lockstep.WALL)
     table = [_cells(figure, fit(_series(segments, figure), WARM_UP[lockstep.MODE])) for figure in figures]
     return [head, "", *_table("figure", table)]
 
@@ -154,13 +155,22 @@ def _of_graph(segments: list[list[Sample]]) -> list[str]:
         _cells(figure, fit(_series(segments, figure, graph.WHOLE), warm_up))
         for figure in (graph.SHARED, graph.FACTOR, graph.PICTURE)
     ]
-    nodes = sorted({name for segment in segments for sample in segment for name in sample[graph.NODES]})
-    for node in nodes:
-        for figure in (MEMORY, FILES, THREADS, graph.SERVICE, graph.PROCESSOR):
-            series = _series(segments, figure, graph.NODES, node)
-            if series:
-                table.append(_cells(f"{node}: {figure}", fit(series, warm_up)))
-    return [head, "", *_table("figure", table)]
+    lines = [head, "", *_table("figure", table), "", "Of each process, mean and slope by hour:", ""]
+    cells = [("process", *OF_NODES), ("---",) * (1 + len(OF_NODES))]
+    for node in _nodes(segments):
+        of_node = (fit(_series(segments, figure, graph.NODES, node), warm_up) for figure in OF_NODES)
+        cells.append((node, *(_cell(slope) for slope in of_node)))
+    return lines + [f"| {' | '.join(row)} |" for row in cells]
+
+
+def _nodes(segments: Sequence[Sequence[Sample]]) -> list[str]:
+    return sorted({name for segment in segments for sample in segment for name in sample[graph.NODES]})
+
+
+def _cell(slope: Slope | None) -> str:
+    if slope is None:
+        return ""
+    return f"{slope.mean:.4g}; {slope.per_hour:+.2g} ± {slope.margin:.1g}, {slope.verdict}"
 
 
 def _cells(name: str, slope: Slope | None) -> tuple[str, ...]:
@@ -188,15 +198,16 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     played = _segments(rows, lockstep.MODE)
     for axis, name in zip(axes, (MEMORY, lockstep.PROCESSOR), strict=False):
         for times, values in _series(played, name):
-            axis.plot(times, values, linewidth=0.8)
+            axis.plot(times, values, linewidth=0.8, marker=".", markersize=2.0)
         axis.set(xlabel="simulated time of the process [h]", ylabel=name, title="lockstep")
     nodes = _segments(rows, graph.MODE)
-    for node in sorted({name for segment in nodes for sample in segment for name in sample[graph.NODES]}):
+    for index, node in enumerate(_nodes(nodes)):
         for times, values in _series(nodes, MEMORY, graph.NODES, node):
-            axes[2].plot(60.0 * times, values - values[0], linewidth=0.8, label=node)
+            style = {"color": f"C{index % 10}", "linestyle": "-" if index < 10 else "--", "linewidth": 0.9}
+            axes[2].plot(60.0 * times, values - values[0], label=node, **style)
     axes[2].set(xlabel="simulated time [min]", ylabel="memory since the first sample [MB]", title="graph")
     if nodes:
-        axes[2].legend(fontsize="x-small", ncols=4)
+        axes[2].legend(fontsize="x-small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     figure.savefig(path, dpi=120)
 
 

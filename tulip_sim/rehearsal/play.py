@@ -93,7 +93,9 @@ class _Stage:
         return self._motion.state().reason or "it fell" if fallen else ""
 
     def go(self, part: Part) -> None:
-        """Play one part."""
+        """Play one part; nothing comes after a fall."""
+        if self.fall:
+            return
         if part.kick is not None:
             self._stop_walking()
             expected = self._motion.expected_ball(part.kick.kind, part.kick.side)

@@ -86,7 +86,10 @@ def _playing(context: Context) -> Behaviour:
 
 
 def _when(name: str, context: Context, test: Callable[[Context], bool], then: Behaviour) -> Behaviour:
-    return EternalGuard(name, then, lambda: test(context))
+    guard = EternalGuard(name, then, lambda: test(context))
+    # py_trees would keep each guard's in a list for ever, and every robot that is set up anew builds the tree again.
+    guard.blackboard.unregister()
+    return guard
 
 
 def _still(name: str, context: Context) -> Act:

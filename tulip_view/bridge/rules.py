@@ -34,7 +34,8 @@ def why_not_publish(name: str, type_name: str, encoding: str) -> str:
     """
     topic = next((each for each in topics.FROM_PEOPLE if is_called(name, each)), None)
     if topic is None:
-        open_ones = " and ".join(each.name for each in topics.FROM_PEOPLE)
+        *others, last = (each.name for each in topics.FROM_PEOPLE)
+        open_ones = f"{', '.join(others)} and {last}"
         return f"{name[:100]} is not for viewers to publish; only {open_ones} are. For the rest there are services."
     if not (name.isascii() and name.isprintable()):  # as C ends a text at a byte 0, so would the check
         return f"{name[:100]!r} is no name of a topic"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -23,11 +24,12 @@ from tulip_sim.bench.processor_time import processor_time
 from tulip_sim.bench.soaking import samples
 from tulip_sim.bench.soaking.resources import resources, shared_memory_files
 from tulip_sim.bench.soaking.samples import SIMULATED, Sample
-from tulip_sim.match_graph import LOOK, SILENCE
+from tulip_sim.match_graph import LOOK
 from tulip_sim.match_rules import NAMESPACES, MatchRules
 from tulip_sim.match_two_graph import MatchWatcher, match_plan
 
 MODE = "graph"
+SILENCE = 300.0  # [s] of wall-clock time without news from the simulator: other programs may have the machine a while
 PERIOD = 20.0  # [s] of simulated time between two samples
 ENDLESS = MatchRules(trials=1000, extra_pairs=0)
 NODES, WHOLE, EVENTS = "nodes", "whole", "events"
@@ -99,15 +101,16 @@ def play(folder: Path, seconds: float, seed: int = 1) -> None:
                 for state in launcher.states()
                 if state.pid
             }
-            spent = {pid: processor_time(pid) for pid in pids.values()}
             period, moment = now - last[0], time.monotonic()
             nodes: dict[str, Sample] = {}
+            spent: dict[int, float] = {}
             for name, pid in pids.items():
-                nodes[name] = resources(pid)
-                if pid in last[2]:
-                    nodes[name][PROCESSOR] = round((spent[pid] - last[2][pid]) / period, 4)
-                if watcher.served[name]:
-                    nodes[name][SERVICE] = round(float(np.mean(watcher.served[name])), 4)
+                with contextlib.suppress(OSError):  # it has ended this moment; the launcher tells
+                    nodes[name], spent[pid] = resources(pid), processor_time(pid)
+                    if pid in last[2]:
+                        nodes[name][PROCESSOR] = round((spent[pid] - last[2][pid]) / period, 4)
+                    if watcher.served[name]:
+                        nodes[name][SERVICE] = round(float(np.mean(watcher.served[name])), 4)
             whole: Sample = {SHARED: shared_memory_files(list(pids.values())), FACTOR: period / (moment - last[1])}
             if watcher.pictures:
                 whole[PICTURE] = round(float(np.mean(watcher.pictures)), 2)
