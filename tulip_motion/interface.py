@@ -156,6 +156,7 @@ class Whereabouts(NamedTuple):
         heading_offset: Heading of base_link in odom less that of the IMU [rad].
         distance: Path length walked since the start [m].
         uncertainty: 16 numbers by rows, covariance of x, y [m], yaw [rad] and its drift [rad/s].
+        sequence: Number of the last command to the legs.
     """
 
     stamp: int
@@ -163,6 +164,7 @@ class Whereabouts(NamedTuple):
     heading_offset: float
     distance: float
     uncertainty: Sequence[float]
+    sequence: int
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,7 @@ from tulip_motion.walking import Walking, must_step
 from tulip_motion.walking_kick import WalkingKick
 
 Array = NDArray[np.float64]
+NOT_KNOWN = 100  # commands that may have been sent since somebody was told the number of one
 
 
 def with_fixed_head(robot: Robot) -> Robot:
@@ -298,11 +299,13 @@ class Motion:
             self._estimator.heading_offset,
             reckoning.distance,
             reckoning.uncertainty.ravel().tolist(),
+            self._sequence,
         )
 
     def continue_from(self, before: Whereabouts, stamp: int) -> None:
         """Go on at a stamp [ns] in the odom of motion control that has died; call before the first tick."""
         gap = (stamp - before.stamp) * 1e-9
+        self._sequence = before.sequence + NOT_KNOWN  # else the driver would wait until the last command is too old
         self._estimator.continue_from(before.heading_offset, (before.base[0], before.base[1]))
         self._dead_reckoning.continue_from(before.distance, np.reshape(before.uncertainty, (4, 4)), gap)
 

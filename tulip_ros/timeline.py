@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from enum import Enum
 
-JUMP = 100_000_000
-"""[ns] Stamps that go back further than this mean that time began anew. One sender's stamps never go back by
-themselves, so this only leaves room for a sender that was restarted."""
+JUMP = 500_000_000
+"""[ns] Stamps that go back further than this mean that time began anew. One sender's stamps go back by themselves only
+where messages overtake each other on their way: a few pictures, of which 16 come in a second, are no new beginning."""
 
 
 class Arrival(Enum):

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 
-from tulip_msgs.msg import MotionState
+from tulip_msgs.msg import Decision, MotionState
 from tulip_ros import topics
 from tulip_ros.launch import HUNG, Launcher
 from tulip_ros.node_process import ProcessState
@@ -43,7 +43,10 @@ SILENT = 0.3  # [s] without news of motion control, after which it is not known 
 SILENCE = 90.0  # [s] of wall-clock time without the simulator, after which the trial is given up
 STOPPED, RUNNING = 0.06, 0.04  # [s] of wall-clock time that a slow node is stopped, and runs, in turn
 SETTLING = 3.0  # [s] after a kill in which the robot may still fall
+HELPED = 60.0  # [s] in which a node that hangs is started again
 STALL = 3.0  # [s] of wall-clock time
+PLAYING = ("robot > playing", "robot > kick under way")
+"""Beginnings of what strategy says that it does."""
 MOVING = (MotionState.WALK, MotionState.KICK)
 SECOND = 1_000_000_000
 RATE = 60  # samples that a second has at most
@@ -57,12 +60,14 @@ class Sample(NamedTuple):
         mode: Of motion control, None while it says nothing.
         torque: Greatest in a leg since the sample before [N m].
         fallen: Whether it lies, in truth.
+        plays: Whether strategy has decided lately, and not only to stand.
     """
 
     stamp: int
     mode: int | None
     torque: float
     fallen: bool
+    plays: bool
 
 
 class FaultWatcher(TrialWatcher):
@@ -84,6 +89,7 @@ class FaultWatcher(TrialWatcher):
         self.samples: list[Sample] = []
         self.motion: MotionState | None = None
         self._torque = 0.0
+        self._decided = -SECOND
 
     @property
     def walks(self) -> bool:
@@ -96,6 +102,10 @@ class FaultWatcher(TrialWatcher):
     def over(self) -> bool:
         """Whether the trial has ended, by a goal."""
         return self.truth is not None and bool(self.truth.outcome)
+
+    def _on_decision(self, message: Decision) -> None:
+        super()._on_decision(message)
+        self._decided = stamp_of(message)
 
     def _on_motion(self, message: MotionState) -> None:
         self.motion = message
@@ -113,7 +123,8 @@ class FaultWatcher(TrialWatcher):
         motion, now = self.motion, self.stamp
         silent = motion is None or now - stamp_of(motion) > SILENT * SECOND
         mode = None if silent or motion is None else int(motion.mode)
-        self.samples.append(Sample(now, mode, self._torque, bool(message.robot_fallen)))
+        plays = now - self._decided < SECOND and self.doing.startswith(PLAYING)
+        self.samples.append(Sample(now, mode, self._torque, bool(message.robot_fallen), plays))
         self._torque = 0.0
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
@@ -130,10 +141,10 @@ def reaction_of(samples: Sequence[Sample]) -> Reaction | None:
         return Reaction.LIMP
     if any(sample.fallen for sample in samples):
         return None
-    later = [sample for sample in samples if sample.stamp > samples[0].stamp + SECOND]
-    if all(sample.mode == MotionState.STAND for sample in end):
-        return Reaction.STANDS
-    return Reaction.GOES_ON if any(sample.mode in MOVING for sample in later) else None
+    if any(sample.plays for sample in end):  # who plays may stand for a while, and look for the ball
+        moves = any(sample.mode in MOVING for sample in samples if sample.stamp > samples[0].stamp + SECOND)
+        return Reaction.GOES_ON if moves else None
+    return Reaction.STANDS if all(sample.mode == MotionState.STAND for sample in end) else None
 
 
 def lies_softly(samples: Sequence[Sample]) -> bool:
@@ -211,7 +222,12 @@ class FaultTrial:
         begin, watcher.said = watcher.stamp, []
         wall = time.monotonic()
         with self._ill(row):
-            self.go_on(lambda: watcher.stamp >= begin + row.seconds * SECOND, row.seconds + 5.0)
+            if row.way is Way.HUNG:
+                restarts = self.process(row.node).restarts
+                self.go_on(lambda: self.process(row.node).restarts > restarts, HELPED)
+                begin = watcher.stamp
+            # A goal ends the play, and says that the robot went on.
+            self.go_on(lambda: watcher.over or watcher.stamp >= begin + row.seconds * SECOND, row.seconds + 5.0)
             wall = time.monotonic() - wall
             samples = [sample for sample in watcher.samples if sample.stamp >= begin]
         node, words = row.tells

@@ -91,7 +91,7 @@ class PerceptionNode(ComponentNode):
             del self._waiting[0]
             if isinstance(pose, MissingPose):
                 self.health.count("views without pose", f"view at {stamp / 1e9:.3f} s dropped: {pose.reason}")
-            else:
+            elif pose[2, 3] > 0.0:  # a fallen robot's belief puts the camera below the ground: nothing to see
                 features = self._perception.features(glimpses, stamp, pose, self._rng)
                 self._features.publish(features_to_message(features))
 

@@ -158,3 +158,18 @@ def test_restarted_while_the_robot_falls_it_stays_limp_and_stands_when_people_ha
     run.go(0.5)
     assert run.motion.mode is MotionMode.STAND
     assert run.world.truth().base_position[2] > 0.9
+
+
+def test_restarted_in_the_middle_of_a_walk_it_goes_on_in_the_same_odom_and_its_commands_are_taken() -> None:
+    run = Run()
+    run.go(4.0, walk(0.3, turn=0.2))
+    before, known = run.motion.odometry(), run.motion.whereabouts()
+    run.motion = Motion(MotionParameters(), run.world.robot)
+    run.motion.continue_from(known, known.stamp + 4_000_000)
+    run.go(TICK, walk(0.3))
+    after = run.motion.odometry()
+    np.testing.assert_allclose(after.position[:2], before.position[:2], atol=0.02)  # a tick's way, and a step's sway
+    np.testing.assert_allclose(after.orientation, before.orientation, atol=0.02)
+    assert after.distance == pytest.approx(before.distance)
+    assert np.diag(after.covariance)[:2].min() >= 0.9 * np.diag(before.covariance)[:2].min()
+    run.go(0.1)  # in which the driver takes each command

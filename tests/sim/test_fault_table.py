@@ -22,11 +22,11 @@ STAND, WALK, FALLEN = MotionState.STAND, MotionState.WALK, MotionState.FALLEN
 
 
 def life(*parts: tuple[float, int | None, float, bool]) -> list[Sample]:
-    """Return samples at 50 Hz of parts that each last so long [s]."""
+    """Return samples at 50 Hz of parts that each last so long [s], in which who walks plays."""
     found: list[Sample] = []
     for seconds, mode, torque, fallen in parts:
         for _ in range(round(50 * seconds)):
-            found.append(Sample((len(found) + 1) * SECOND // 50, mode, torque, fallen))
+            found.append(Sample((len(found) + 1) * SECOND // 50, mode, torque, fallen, mode == WALK))
     return found
 
 
@@ -48,6 +48,13 @@ def life(*parts: tuple[float, int | None, float, bool]) -> list[Sample]:
 )
 def test_what_the_robot_does_is_told_from_how_it_was(samples: list[Sample], reaction: Reaction | None) -> None:
     assert reaction_of(samples) is reaction
+
+
+def test_who_stands_to_look_for_the_ball_plays_and_who_walks_on_without_being_told_does_not() -> None:
+    walks, looks = life((5.0, WALK, 30.0, False)), life((8.0, STAND, 10.0, False))[250:]
+    assert reaction_of([*walks, *(sample._replace(plays=True) for sample in looks)]) is Reaction.GOES_ON
+    assert reaction_of([sample._replace(plays=False) for sample in walks]) is None
+    assert reaction_of([sample._replace(plays=True) for sample in looks]) is None  # and has not moved at all
 
 
 def test_a_robot_lies_softly_without_torque_from_a_second_after_its_fall_on() -> None:

@@ -13,6 +13,7 @@ from tulip_description.planar import Pose2D
 from tulip_motion.messages import odometry_to_message
 from tulip_msgs.msg import Features as FeaturesMessage
 from tulip_ros import topics
+from tulip_ros.keepsake import VARIABLE, Keepsake, Memory
 from tulip_ros.run import session
 from tulip_ros.time import from_message, stamp_of
 from tulip_strategy.messages import world_state_from_message
@@ -174,3 +175,31 @@ def test_a_start_pose_that_is_none_is_refused(x: float, w: float) -> None:
     turn = message.pose.pose.orientation
     turn.z, turn.w = turn.z * w, turn.w * w
     assert start_pose_from_message(message) is None
+
+
+def test_a_node_that_died_is_followed_by_one_that_knows_where_the_robot_has_come_to(
+    ros_domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    memory = Memory("worldmodel")
+    monkeypatch.setenv(VARIABLE, memory.path)
+    messages, _ = simulated()
+    odometry = [message for message in messages if isinstance(message, OdometryMessage)]
+    half = len(odometry) // 2
+    with session(WorldModelNode, ["test"], handle_signals=False) as (node, _):
+        node._on_start_pose(start_pose_to_message(Pose2D(1.0, 2.0, 0.5), 0))
+        for message in odometry[:half]:
+            node._on_odometry(message)
+        before = Keepsake().read()
+    with session(WorldModelNode, ["test"], handle_signals=False) as (node, _):
+        node._on_start_pose(start_pose_to_message(Pose2D(-3.0, -2.0, 0.0), 0))  # latched; it was used long ago
+        node._on_odometry(odometry[-1])  # some way on
+        after = node._world.state(stamp_of(odometry[-1])).robot
+    way = Pose2D(*before["odom"]).inverse() @ after.pose_in_odom
+    expected = Pose2D(*before["map"]) @ way
+    assert math.hypot(way.x, way.y) > 0.05
+    np.testing.assert_allclose(after.pose.as_array(), expected.as_array(), atol=1e-3)
+    with session(WorldModelNode, ["test"], handle_signals=False) as (node, _):
+        node._before["stamp"] = 10**15  # of the time before the simulation began anew
+        node._on_odometry(odometry[0])
+        assert node._world.state(0).robot.pose.x == pytest.approx(-1.5, abs=0.01)  # where the parameters say
+    memory.close()

@@ -89,6 +89,9 @@ def check_limits(rig: Rig, home: Array) -> Iterator[Row]:
     speed = (
         np.abs(np.diff(position, axis=0)) / np.maximum(np.diff(times), 1e-9)[:, None] / rig.robot.velocity_limits[own]
     )
+    # A position means nothing without stiffness, as after a pause of the computer in which commands grew old.
+    held = column("stiffness") > 0.0
+    speed = np.where(held[1:] & held[:-1], speed, 0.0)
     yield judged("limit: rate", f"{speed.max():.2f} of the greatest speed", "1", bool(speed.max() < 1.001))
     velocity = float((np.abs(column("velocity")) / rig.robot.velocity_limits[own]).max())
     yield judged("limit: velocity", f"{velocity:.2f} of the greatest", "1", velocity < 1.001)

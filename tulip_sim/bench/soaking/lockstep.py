@@ -67,19 +67,19 @@ class _Watch:
         )
 
     def _take(self, simulated: float, ended: Sample | None = None) -> None:
-        now = (simulated, time.process_time(), time.monotonic())
-        period = now[0] - self._last[0]
         sample: Sample = {
             SIMULATED: round(simulated, 3),
             SEED: self.seed,
             **resources(os.getpid()),
             OBJECTS: len(gc.get_objects()),
             SHARED: shared_memory_files([os.getpid()]),
-            PROCESSOR: round((now[1] - self._last[1]) / period, 4),
-            WALL: round((now[2] - self._last[2]) / period, 4),
         }
+        played = simulated - self._last[0]
+        if played >= 0.5 * PERIOD:  # of less, as at the end of a match, the cost says little
+            sample[PROCESSOR] = round((time.process_time() - self._last[1]) / played, 4)
+            sample[WALL] = round((time.monotonic() - self._last[2]) / played, 4)
+            self._last = (simulated, time.process_time(), time.monotonic())
         samples.add(self._file, sample | ({} if ended is None else {ENDED: ended}))
-        self._last = (simulated, time.process_time(), time.monotonic())
 
 
 @cache
