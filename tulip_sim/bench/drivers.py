@@ -136,15 +136,15 @@ def measure(driver: str, number: int | str) -> Row:
     ):
         for _ in range(TRIES):
             for kind in KINDS:
-                begin = time.monotonic() + float(rng.uniform(0.0, 0.05))
-                until(partial(_is_past, begin))
-                for name, moment in _times(driver, ear, commander, kind, until).items():
+                for name, moment in _times(driver, ear, commander, kind, until, rng).items():
                     row.setdefault(f"{kind}, {name} [ms]", []).append(round(1e3 * moment, 2))
     return row
 
 
-def _times(driver: str, ear: socket.socket, commander: Commander, kind: str, until: Until) -> dict[str, float]:
-    """Stop the robot and return how long it took until it was told and seen [s].
+def _times(
+    driver: str, ear: socket.socket, commander: Commander, kind: str, until: Until, rng: np.random.Generator
+) -> dict[str, float]:
+    """Stop the robot at a random moment and return how long it took until it was told and seen [s].
 
     On a busy machine commands grow old by themselves, so that nothing is left to stop: then it is tried again.
 
@@ -153,6 +153,7 @@ def _times(driver: str, ear: socket.socket, commander: Commander, kind: str, unt
     """
     for _ in range(AGAIN):
         until(lambda: commander.steady >= STEADY)
+        until(partial(_is_past, time.monotonic() + float(rng.uniform(0.0, 0.05))))
         while _heard(ear, 0.0) is not None:
             pass
         begin, seen = _try(commander, kind, until)
