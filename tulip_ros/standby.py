@@ -1,6 +1,6 @@
 """A process that has imported what the robot's nodes need, and waits to become one of them.
 
-Most of a node's start is importing: with it a killed node would be back after seconds, without it within a second.
+Most of a node's start is importing: with it a killed node would be back after seconds, without it much sooner.
 
     python -m tulip_ros.standby MODULE...
 
