@@ -170,12 +170,12 @@ ROWS: tuple[Row, ...] = (
         hold=1,
     ),
     _messages(
-        "sensor readings and leg commands late by 40 ms each",
+        "sensor readings and leg commands late by 100 ms each",
         JOINT_LOOP,
         LIMP,
         "no gait balances with it: motion control sees the fall and lets go",
         kind="late",
-        hold=10,
+        hold=25,
     ),
     _messages(
         "sensor readings and leg commands doubled",
