@@ -40,7 +40,7 @@ def main() -> int:
     if failed:
         print(f"failed before the tests: {', '.join(failed)}", flush=True)
     code = subprocess.run(
-        [sys.executable, "-m", "pytest", "-rs", "--durations=25", *arguments], cwd=_environment.ROOT, env=variables
+        [sys.executable, "-m", "pytest", "-rfEs", "--durations=25", *arguments], cwd=_environment.ROOT, env=variables
     ).returncode
     if code == NO_TESTS:
         print("pytest ran no test", file=sys.stderr)

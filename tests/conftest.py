@@ -16,6 +16,15 @@ settings.load_profile("any machine")
 GRAPH = {"ros_domain", "module_ros_domain"}
 """Fixtures of tests that run nodes: one after the other, since a graph fills two cores."""
 DOMAINS = 102  # above 101 the ports collide with those that the system gives out
+APART = 31  # domains between those of two processes, who look for free ones from there on
+
+
+def pytest_configure() -> None:
+    """Give each process of pytest-xdist a ROS domain of its own, for tests whose nodes are all in one process."""
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "")
+    if worker:
+        first = int(os.environ.get("ROS_DOMAIN_ID", 0))
+        os.environ["ROS_DOMAIN_ID"] = str((first + APART * int(worker.removeprefix("gw"))) % DOMAINS)
 
 
 @pytest.hookimpl(tryfirst=True)
