@@ -15,6 +15,7 @@ from tulip_sim.fault_table import ROWS
 from tulip_sim.fault_trial import RULES, SECOND, FaultTrial, running
 from tulip_sim.match_graph import trial_plan
 from tulip_sim.perception import PerceptionParameters
+from tulip_sim.trial import TrialObserver
 
 pytestmark = [pytest.mark.ros, pytest.mark.sim, pytest.mark.slow, pytest.mark.usefixtures("ros_domain")]
 
@@ -45,6 +46,9 @@ def test_killed_nodes_come_back_with_all_that_was_latched_or_known_and_a_stopped
             assert trial.process(node).restarts == 1
         # It knows the user's wish, the game and its own place: else it would not play on where it was.
         trial.walk()
+        trial.watcher.observer = TrialObserver()  # while people carried it, if it fell, it could not know its place
+        begin = trial.watcher.stamp
+        trial.go_on(lambda: trial.watcher.stamp > begin + 2 * SECOND, 10.0)
         assert trial.watcher.observer.localization_error < 0.5
 
         row = next(row for row in ROWS if row.name == "strategy stopped")

@@ -183,7 +183,10 @@ def test_the_doctor_tells_of_variables_that_open_nothing_any_more(name: str) -> 
     assert found.level == installation.OK
 
 
-def test_the_doctor_refuses_a_peer_that_is_none(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_doctor_refuses_a_peer_that_is_none(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv(transport.PROFILE_VARIABLE, raising=False)  # a node of another test may have set it
     assert doctor.main(["--network", "10.0.0"]) == 2
     assert capsys.readouterr().err.startswith("error: --network: '10.0.0' is no address")
 

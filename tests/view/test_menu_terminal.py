@@ -62,7 +62,7 @@ class Robot(Node):  # type: ignore[misc]
     def __init__(self) -> None:
         super().__init__("robot")
         self.commands: list[UserCommand] = []
-        topics.USER_COMMAND.subscribe_from(self, self.commands.append)
+        topics.USER_COMMAND.subscribe_from(self, self.commands.append, depth=50)  # none is missed
 
 
 @contextmanager
