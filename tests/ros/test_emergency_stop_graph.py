@@ -110,7 +110,7 @@ def test_a_stop_told_by_topic_alone_outlives_driver_and_user_input_and_ends_by_r
         face.publish(EmergencyStop(engaged=True, by="tester", reason="a test"))
         until(lambda: not ears.stiff and ears.torque == 0.0)
         until(lambda: ears.users[-1].request == UserCommand.LIMP)
-        until(lambda: ears.motion[-1].mode == MotionState.LIMP)
+        until(lambda: ears.motion and ears.motion[-1].mode == MotionState.LIMP)
         assert ears.motion[-1].reason == "emergency stop by tester (a test)"
         until(lambda: "emergency stop by tester (a test): release it" in ears.said.get("driver", ""))
         ears.destroy_publisher(face)  # those that live remember it
@@ -126,11 +126,11 @@ def test_a_stop_told_by_topic_alone_outlives_driver_and_user_input_and_ends_by_r
         refused = ears.ask(topics.STAND, until)
         assert not refused.success and refused.message == "emergency stop by tester (a test); release it first"
         assert ears.ask(topics.RELEASE_STOP, until).success
-        until(lambda: not ears.words[-1].engaged)
+        until(lambda: ears.words and not ears.words[-1].engaged)
         until(more(ears.legs))
         assert not any(np.any(each.stiffness) for each in ears.legs[-MANY:])  # limp until somebody wants another thing
         assert ears.ask(topics.ENGAGE_STOP, until).success
-        until(lambda: ears.words[-1].engaged and ears.words[-1].by == "user_input")
+        until(lambda: ears.words and ears.words[-1].engaged and ears.words[-1].by == "user_input")
 
 
 def test_a_bodys_own_stop_button_stops_everybody_and_holds_after_it_is_out_again(tmp_path: Path) -> None:
@@ -142,7 +142,11 @@ def test_a_bodys_own_stop_button_stops_everybody_and_holds_after_it_is_out_again
         with graph(tmp_path / "logs", "button_body:ButtonBody", values) as (ears, until, _):
             until(lambda: ears.stiff and ears.torque > 0.0 and ears.users)
             button.touch()
-            until(lambda: not ears.stiff and ears.torque == 0.0 and ears.users[-1].request == UserCommand.LIMP)
+            until(
+                lambda: (
+                    not ears.stiff and ears.torque == 0.0 and ears.users and ears.users[-1].request == UserCommand.LIMP
+                )
+            )
             assert (ears.words[-1].by, ears.words[-1].reason) == ("driver", "its stop button is pressed")
             number = ears.words[-1].sequence
             assert ears.ask(topics.RELEASE_STOP, until).success

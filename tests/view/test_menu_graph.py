@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -97,6 +98,7 @@ def test_menu_waits_for_user_input_agrees_with_a_second_face_and_goes_on_after_a
             # A new user_input hears of the stop from the menu.
             await screen.until_text("wish LIMP", "emergency stop by menu")
             await screen.until(lambda: "does not run" not in screen.text)
+            await screen.until(lambda: re.search(r"user_input error +\d", screen.text))  # it has heard of it
             await screen.press("o")
             await screen.until_text("release: taken")
             await screen.press("u")
