@@ -20,6 +20,8 @@ CHECKS: tuple[tuple[str, ...], ...] = (
     ("mypy",),
     ("lint-imports",),
 )
+# What `test` installs besides. Named, since else the first script that a test starts would install the project again.
+OF_SCRIPTS = ("batch", "bridge", "mujoco", "ray", "report", "sdf", "tune", "view")
 NO_TESTS = 5  # pytest's exit code when nothing matched
 
 
@@ -59,5 +61,6 @@ def test_variables() -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    _environment.prepare(extras=("test", "browser") if any(map(shutil.which, _environment.BROWSERS)) else ("test",))
+    browser = ("browser",) if any(map(shutil.which, _environment.BROWSERS)) else ()
+    _environment.prepare(extras=("test", *OF_SCRIPTS, *browser))
     raise SystemExit(main())
