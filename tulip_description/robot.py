@@ -124,6 +124,11 @@ class Foot:
     cells: tuple[tuple[float, float], ...]
 
     @property
+    def width(self) -> float:
+        """From the right edge to the left one [m]."""
+        return self.y[1] - self.y[0]
+
+    @property
     def corners(self) -> Array:
         """(4, 3) corners in the sole frame [m]."""
         return np.array([(x, y, 0.0) for x in self.x for y in self.y])

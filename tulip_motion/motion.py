@@ -406,7 +406,7 @@ class Motion:
             if p.gait == "paper":
                 self._gait = PaperGait(p, self._feet(), self._middle())
             else:
-                self._gait = Walking(p, self._reach, self._feet(), self._middle())
+                self._gait = Walking(p, self._reach, self._soles, self._feet(), self._middle())
             self._mode = MotionMode.WALK
 
     def _wants_to_step(self, estimate: Estimate) -> bool:

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable
 
 from tulip_description.planar import Pose2D
+from tulip_description.robot import Foot
 from tulip_motion.course import Course, Wish
 from tulip_motion.footsteps import Footstep
 from tulip_motion.gait import FootMotion, Reference, SwingFoot, between_soles, sole_point, support_on
@@ -21,6 +22,7 @@ from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import Reach
 from tulip_motion.stabilizer import SupportArea
 from tulip_motion.step_adjustment import StepAdjustment
+from tulip_motion.swing_detour import Detour, detour
 from tulip_motion.walking_kick import KickSwing, WalkingKick
 
 
@@ -31,6 +33,7 @@ class Walking:
         self,
         parameters: MotionParameters,
         reach: Reach,
+        soles: tuple[Foot, Foot],
         feet: tuple[Footstep, Footstep],
         zmp: tuple[float, float],
     ) -> None:
@@ -39,10 +42,12 @@ class Walking:
         Args:
             parameters: Of motion control.
             reach: Of the robot.
+            soles: Left and right sole of the robot.
             feet: Left and right foot as they stand.
             zmp: Where the ZMP is now, in odom [m].
         """
         self._parameters = parameters
+        self._soles = soles
         self._time_constant = time_constant(parameters.com_height)
         self.feet = feet
         self.course = Course(parameters, reach)
@@ -52,6 +57,7 @@ class Walking:
         self._zmp = zmp
         self._stance: Footstep | None = None
         self._swing: SwingFoot | KickSwing | None = None
+        self._detour: Detour | None = None
         self.kick: WalkingKick | None = None
         """A kick to be done by one of the steps."""
         self._adjustments = [
@@ -203,11 +209,18 @@ class Walking:
             if self._swing is None:
                 duration = self._landing_time - self._time
                 self._swing = self.kick.swing(trailing.pose, duration) if self.kick is not None else None
-                self._swing = self._swing or SwingFoot(trailing.pose, duration, p.swing_height, p.landing_speed)
+                self._detour = None
+                if self._swing is None:
+                    self._swing = SwingFoot(trailing.pose, duration, p.swing_height, p.landing_speed)
+                    gap = p.min_foot_distance - self._soles[0].width  # as near as it may land
+                    self._detour = detour(self._soles, stance, trailing.pose, self._target, gap)
             if self._landing_time - self._time > p.placement_freeze_time:
                 self._adjust(dcm)
                 zmp, planned = self._planned()
             foot = self._swing.advance(self._target, self._landing_time - self._time, dt)
+            if self._detour is not None:
+                rate = 1.0 / (self._landing_time - self._shift_time)
+                foot = self._detour.added_to(foot, (self._time - self._shift_time) * rate, rate)
             support = support_on(stance.side)
         yaw_difference = math.remainder(foot.yaw - stance.pose.yaw, 2.0 * math.pi)
         return Reference(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -13,7 +12,6 @@ from tulip_ros.priority import GROUP, NICE
 
 PROGRAM = """
 import os
-from pathlib import Path
 from threading import Thread
 from tulip_ros.priority import give_way
 give_way()

@@ -53,6 +53,12 @@ def reading(joints: np.ndarray, turn: Rotation, **changes: np.ndarray) -> Sensor
     return replace(still, **changes)
 
 
+def test_feet_keep_clear_of_each_other_on_the_fastest_curve() -> None:
+    course = play(parse(["walk", "0.29", "0", "1.16", "5"], PARAMETERS), PARAMETERS, standing(ROBOT), seed=1)
+    assert not course.fall
+    assert course.clearance[0] > Limits().clearance  # on their straight ways they would be 10 mm within each other
+
+
 def test_motions_follow_each_other_as_they_are_written() -> None:
     walk, stand, kick, aside = parse(
         ["walk", "-0.2", "0", "0.5", "stand", "2", "kick", "left", "2.5", "sidekick", "right"], PARAMETERS, 7.0
