@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from tulip_description.body_file import read_body
@@ -15,12 +14,11 @@ from tulip_description.model import floating_model
 from tulip_description.planar import Pose2D
 from tulip_description.robot import HEAD_JOINTS, LEG_JOINTS, Robot
 from tulip_description.robot_io import JointCommand, Sensors
-from tulip_description.short_numbers import significant
 from tulip_motion.course import Wish, is_at, middle
 from tulip_motion.fall_detection import FallDetector
+from tulip_motion.footing import Footing
 from tulip_motion.footsteps import Footstep
-from tulip_motion.gait import FootMotion, Reference, between_soles
-from tulip_motion.ground_track import GroundTrack, carried
+from tulip_motion.gait import FootMotion, Reference
 from tulip_motion.interface import (
     KickGoal,
     KickKind,
@@ -34,17 +32,14 @@ from tulip_motion.interface import (
     WalkMode,
     Whereabouts,
 )
-from tulip_motion.inverse_kinematics import rotation_z
 from tulip_motion.kick import Kick, moved
 from tulip_motion.kick_plan import expected_ball, plan_kick, refused_numbers
-from tulip_motion.odometry import DeadReckoning
 from tulip_motion.paper_gait import PaperGait
 from tulip_motion.parameters import MotionParameters
 from tulip_motion.reach import reach
 from tulip_motion.sensor_check import SensorCheck
 from tulip_motion.stabilizer import Balance, SupportArea, stabilize
 from tulip_motion.state_estimator import Estimate, StateEstimator, centre_of_pressure
-from tulip_motion.tilt_filter import TiltFilter
 from tulip_motion.tracking import Order, StepInProgress, Tracking
 from tulip_motion.walking import Walking, must_step
 from tulip_motion.walking_kick import WalkingKick
@@ -93,14 +88,11 @@ class Motion:
         self._sequence = 0
         self._stamp = 0
         self._left_weight = 0.5
-        self._dead_reckoning = DeadReckoning(p)
-        self._ground = GroundTrack(p, [foot.cells for foot in robot.feet])
-        self._shift = (0.0, 0.0)  # [m] of base_link in odom by slips since the feet were last put where they are
+        self._footing = Footing(p, self._estimator, robot.feet)
         self._falls = FallDetector(p)
         self._sensor_check = SensorCheck(p)
         self._broken = ""  # why the sensors cannot be used, in words
         self._area: SupportArea | None = None
-        self._tilt = TiltFilter(p.control_period, p.imu_bias_time, p.imu_bias_limit)
 
     @property
     def mode(self) -> MotionMode:
@@ -171,17 +163,19 @@ class Motion:
             return self._start_walking_kick(goal)
         if self._mode is not MotionMode.STAND or not self._started:
             return f"motion is in mode {self._mode.name}; a {goal.kind.name.lower()} kick starts from STAND"
-        p, feet, base = self._parameters, self._feet(), self._base_footprint()
-        plan = plan_kick(p, goal, self._feet_in_base(), self._soles)
+        p, feet, base = self._parameters, self._footing.feet, self._estimate.base_footprint
+        plan = plan_kick(p, goal, self._footing.feet_beside(base), self._soles)
         if isinstance(plan, str):
             return plan
-        self._gait = self._kick = Kick(p, [moved(move, base) for move in plan], feet, feet[goal.side], self._middle())
+        moves = [moved(move, base) for move in plan]
+        self._gait = self._kick = Kick(p, moves, feet, feet[goal.side], self._footing.middle)
         self._mode = MotionMode.KICK
         return ""
 
     def expected_ball(self, kind: KickKind, side: Side) -> tuple[float, float]:
         """Return where a kick from standing expects the ball, as the feet stand: (x, y) in base_footprint [m]."""
-        return expected_ball(self._parameters, kind, side, self._feet_in_base(), self._soles)
+        feet = self._footing.feet_beside(self._estimate.base_footprint)
+        return expected_ball(self._parameters, kind, side, feet, self._soles)
 
     def cancel_kick(self) -> str:
         """Give the running kick up as its phase allows; return "" or the reason why not."""
@@ -206,7 +200,7 @@ class Motion:
         refusal = refused_numbers(goal, p.max_walking_kick_speed, 0.0, p.max_walking_kick_direction)
         if refusal:
             return refusal
-        base = self._base_footprint()
+        base = self._estimate.base_footprint
         ball, direction = base.transform(goal.ball), base.yaw + goal.direction
         kick = WalkingKick(p, self._reach, goal.side, ball, direction, goal.speed, self._soles)
         refusal = self._gait.kick_next(kick)
@@ -219,8 +213,7 @@ class Motion:
         self._stamp = sensors.stamp
         self._broken = self._sensor_check.update(sensors)
         estimate = self._estimate = self._estimator.update(sensors, self._left_weight, self._tracking.com_acceleration)
-        self._tilt.update(sensors, estimate.base_rotation, estimate.soles, estimate.loads, self._left_weight)
-        self._track_ground(estimate, sensors)
+        self._follow(estimate, sensors)
         if not self._started:
             self._start(estimate)
         self._change_mode(estimate)
@@ -239,23 +232,7 @@ class Motion:
 
     def odometry(self) -> Odometry:
         """Return dead reckoning as of the last tick."""
-        estimate = self._estimate
-        yaw = math.atan2(estimate.base_rotation[1, 0], estimate.base_rotation[0, 0])
-        position = np.array([*self._ground.position, estimate.base_position[2]])
-        return Odometry(
-            self._stamp,
-            position,
-            pin.Quaternion(self._tilt.corrected(estimate.base_rotation)).coeffs(),
-            rotation_z(-yaw) @ estimate.base_velocity,
-            estimate.base_rotation.T @ estimate.angular_velocity,
-            self._dead_reckoning.distance,
-            significant(
-                self._dead_reckoning.pose_covariance(
-                    self._stamp, position, yaw, self._ground.signs, self._mode is MotionMode.FALLEN
-                )
-            ),
-            significant(self._dead_reckoning.twist_covariance()),
-        )
+        return self._footing.odometry(self._estimate, self._stamp, self._mode is MotionMode.FALLEN)
 
     def state(self) -> MotionState:
         """Return the state of the legs as of the last tick."""
@@ -291,23 +268,12 @@ class Motion:
 
     def whereabouts(self) -> Whereabouts:
         """Return what `continue_from` takes, as of the last tick."""
-        x, y = self._ground.position
-        reckoning = self._dead_reckoning
-        return Whereabouts(
-            self._stamp,
-            (float(x), float(y)),
-            self._estimator.heading_offset,
-            reckoning.distance,
-            reckoning.uncertainty.ravel().tolist(),
-            self._sequence,
-        )
+        return self._footing.whereabouts(self._stamp, self._sequence)
 
     def continue_from(self, before: Whereabouts, stamp: int) -> None:
         """Go on at a stamp [ns] in the odom of motion control that has died; call before the first tick."""
-        gap = (stamp - before.stamp) * 1e-9
         self._sequence = before.sequence + NOT_KNOWN  # else the driver would wait until the last command is too old
-        self._estimator.continue_from(before.heading_offset, (before.base[0], before.base[1]))
-        self._dead_reckoning.continue_from(before.distance, np.reshape(before.uncertainty, (4, 4)), gap)
+        self._footing.continue_from(before, stamp)
 
     def save_learning(self) -> None:
         """Write what was learned since the last time to `learning_file`, if there is one."""
@@ -318,55 +284,19 @@ class Motion:
         """How many steps the walk that is under way has begun."""
         return self._gait.step_count if isinstance(self._gait, Walking | PaperGait) else 0
 
-    def _base_footprint(self) -> Pose2D:
-        """Return where base_footprint is in odom."""
-        position, rotation = self._estimate.base_position, self._estimate.base_rotation
-        return Pose2D(float(position[0]), float(position[1]), math.atan2(rotation[1, 0], rotation[0, 0]))
-
-    def _feet(self) -> tuple[Footstep, Footstep]:
-        """Return the left and right foot where they stand, in odom; one in the air where it stood last."""
-        left, right = self._estimator.anchors
-        return Footstep(Side.LEFT, left), Footstep(Side.RIGHT, right)
-
-    def _feet_in_base(self) -> tuple[Pose2D, Pose2D]:
-        """Return the left and right sole in base_footprint."""
-        to_base = self._base_footprint().inverse()
-        left, right = self._feet()
-        return to_base @ left.pose, to_base @ right.pose
-
-    def _middle(self) -> tuple[float, float]:
-        """Return where a standing robot has its ZMP, in odom [m]."""
-        return between_soles(self._feet(), self._parameters.zmp_forward, self._parameters.zmp_inward)
-
-    def _track_ground(self, estimate: Estimate, sensors: Sensors) -> None:
-        """Follow base_link over the ground. A robot that lies or sinks is taken to stay where its feet are."""
-        estimator = self._estimator
-        x, y, _ = estimate.base_position.tolist()
-        x, y = x - estimator.shift[0], y - estimator.shift[1]
-        if self._started and self._mode not in (MotionMode.LIMP, MotionMode.FALLEN):
-            ax, ay, _ = self._tracking.com_acceleration.tolist()
-            self._ground.update(estimate, sensors.foot_cells, (ax, ay))
-        else:
-            self._ground.begin(estimate, (x + self._shift[0], y + self._shift[1]))
-        self._shift = (self._ground.position[0] - x, self._ground.position[1] - y)
-        # While it walks, the robot minds where its body is, and steps there; else, how it stands on its feet.
+    def _follow(self, estimate: Estimate, sensors: Sensors) -> None:
+        """Follow feet and body over the ground."""
+        upright = self._started and self._mode not in (MotionMode.LIMP, MotionMode.FALLEN)
+        acceleration = self._tracking.com_acceleration if upright else None
+        self._footing.update(estimate, sensors, self._left_weight, acceleration, isinstance(self._gait, Walking))
         if self._gait is None:
-            self._move_feet_along()
-        estimator.shift = self._shift if isinstance(self._gait, Walking) else (0.0, 0.0)
-        estimator.pivots = self._ground.pivots
-
-    def _move_feet_along(self) -> None:
-        """Take the feet to stand where slips have carried them with the body."""
-        for side, foot in zip(Side, self._estimator.anchors, strict=True):
-            moved = Pose2D(foot.x + self._shift[0], foot.y + self._shift[1], foot.yaw)
-            self._estimator.anchor(Footstep(side, moved))
-        self._shift = (0.0, 0.0)
+            self._footing.move_feet_along()
 
     def _start(self, estimate: Estimate) -> None:
         """Begin to stand where the robot is, if it stands: motion control may have been restarted during a fall."""
         self._tracking.reset(estimate)
         self._left_weight = 0.5
-        self._dead_reckoning.begin(self._stamp, self._ground.position)
+        self._footing.begin(self._stamp)
         self._started = True
         p = self._parameters
         if estimate.tilt > p.upright_tilt or _height(estimate) < p.upright_height:
@@ -385,7 +315,7 @@ class Motion:
                 self._fall("fell while it was limp on request")
             elif not self._broken and self._may_stand(estimate) and wanted is not WalkMode.LIMP:
                 self._steps_before += self._steps_of_gait
-                self._move_feet_along()
+                self._footing.move_feet_along()
                 self._estimator.restart()
                 self._mode, self._reason, self._gait, self._started = MotionMode.STAND, "", None, False
             return
@@ -404,35 +334,35 @@ class Motion:
             self._mode = MotionMode.STAND
         elif self._mode is MotionMode.STAND and self._wants_to_step(estimate):
             if p.gait == "paper":
-                self._gait = PaperGait(p, self._feet(), self._middle())
+                self._gait = PaperGait(p, self._footing.feet, self._footing.middle)
             else:
-                self._gait = Walking(p, self._reach, self._soles, self._feet(), self._middle())
+                self._gait = Walking(p, self._reach, self._soles, self._footing.feet, self._footing.middle)
             self._mode = MotionMode.WALK
 
     def _wants_to_step(self, estimate: Estimate) -> bool:
         """Return whether a standing robot begins to walk: when told to, or when it would fall otherwise."""
         p, wish = self._parameters, self._wish()
         if isinstance(wish, Pose2D):
-            away = not is_at(wish, middle(self._feet(), p.stance_width), p.goal_tolerance, p.goal_tolerance_yaw)
+            away = not is_at(wish, middle(self._footing.feet, p.stance_width), p.goal_tolerance, p.goal_tolerance_yaw)
         else:
             away = wish is not None
         # One that has just been put down bounces; what it does in the air is no reason.
         stands = sum(estimate.loads) > 2.0 * p.contact_force
-        return away or (stands and p.gait == "dcm" and must_step(p, self._feet(), estimate.dcm))
+        return away or (stands and p.gait == "dcm" and must_step(p, self._footing.feet, estimate.dcm))
 
     def _wish(self) -> Wish:
         """Return what the present command asks of the walk."""
         command = self._command
         if command.mode is WalkMode.GO:
             # The feet follow the slips that odometry has seen only when one lands.
-            goal, (x, y) = command.goal, self._shift
+            goal, (x, y) = command.goal, self._footing.shift
             return Pose2D(goal.x - x, goal.y - y, goal.yaw)
         return command.velocity if command.mode is WalkMode.WALK else None
 
     def _fall(self, reason: str) -> None:
         """Go limp; how far the body rolls from now on the odometry cannot know."""
         self._mode, self._reason = MotionMode.FALLEN, reason
-        self._dead_reckoning.fall()
+        self._footing.fall()
 
     def _may_stand(self, estimate: Estimate) -> bool:
         """Return whether the body is such that stiff legs would hold it; one that fell has to be set upright first."""
@@ -453,11 +383,11 @@ class Motion:
             else:
                 reference = gait.tick(dt, self._wish(), estimate.dcm, estimate.sole_pose, estimate.loads)
             if isinstance(gait, Walking):
-                gait.feet = carried(before, gait.feet, self._shift, estimate)
-            self._anchor(gait.feet)
+                gait.feet = self._footing.carried(before, gait.feet, estimate)
+            self._footing.put(gait.feet, self._stamp)
             return reference
-        left, right = self._feet()
-        middle = self._middle()
+        left, right = self._footing.feet
+        middle = self._footing.middle
         return Reference(
             Support.DOUBLE,
             left,
@@ -468,17 +398,6 @@ class Motion:
             0.0,
             0.0,
         )
-
-    def _anchor(self, feet: tuple[Footstep, Footstep]) -> None:
-        """Tell the estimator where the feet stand, and count the way."""
-        before = self._estimator.anchors
-        if (feet[0].pose, feet[1].pose) != tuple(before):
-            self._dead_reckoning.step(
-                self._stamp, self._ground.position, before, [foot.pose for foot in feet], self._ground.signs
-            )
-            for foot in feet:
-                self._estimator.anchor(foot)
-            self._shift = self._estimator.shift = (0.0, 0.0)
 
     def _stabilize(self, estimate: Estimate, reference: Reference) -> Balance:
         """Return ZMP and CMP that bring the measured DCM back to the planned one, within what the body can do."""

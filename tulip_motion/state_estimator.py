@@ -92,6 +92,12 @@ class Estimate(NamedTuple):
         """Return where a sole is, seen from above."""
         return self.soles[side].pose
 
+    @property
+    def base_footprint(self) -> Pose2D:
+        """Where base_footprint is in odom."""
+        yaw = math.atan2(self.base_rotation[1, 0], self.base_rotation[0, 0])
+        return Pose2D(float(self.base_position[0]), float(self.base_position[1]), yaw)
+
 
 class StateEstimator:
     """Says where the body is, from where the soles stand and what IMU and joints say."""
