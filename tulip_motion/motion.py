@@ -312,7 +312,7 @@ class Motion:
         p, wanted = self._parameters, self._command.mode
         if self._mode is MotionMode.FALLEN or self._mode is MotionMode.LIMP:
             if self._mode is MotionMode.LIMP and estimate.tilt > p.fall_tilt:
-                self._fall("fell while it was limp on request")
+                self._fall(f"{self._reason}; then it fell")
             elif not self._broken and self._may_stand(estimate) and wanted is not WalkMode.LIMP:
                 self._steps_before += self._steps_of_gait
                 self._footing.move_feet_along()

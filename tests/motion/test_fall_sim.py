@@ -91,7 +91,7 @@ def test_a_robot_that_falls_while_limp_on_request_says_so() -> None:
     for _ in range(500):
         body.tick(WalkCommand(0, WalkMode.LIMP))
     assert body.motion.mode is MotionMode.FALLEN
-    assert body.motion.state().reason == "fell while it was limp on request"
+    assert body.motion.state().reason == "limp on request; then it fell"
 
 
 @pytest.mark.parametrize("gait", ["dcm", "paper"])
