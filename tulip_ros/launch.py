@@ -28,6 +28,7 @@ HUNG = 10.0  # [s] without a sign of life, of which one comes each second: no ca
 LIVELY = 3.0  # [s] since the last sign of some other node: else it is the machine that stands still, not the node
 ABSENT = 2.0  # [s] between two polls after which the launcher itself was held up, and begins to watch anew
 BUSY = 10.0  # [s] since the first start, in which the processor has better to do than to have a process wait
+JOINING = 3.0  # [s] since the last start, in which a node and all others get to know each other
 CALM = 5.0  # [s] since the last start, after which there is time to tidy up
 
 
@@ -115,9 +116,9 @@ class Launcher:
                 said += self._stand_still(process)
         said += self._kill_hung(now)
         said += self._heed_answers()
-        if self._standby is not None and now - self._first_start > BUSY:
+        if self._standby is not None and now - self._first_start > BUSY and now - self._last_start > JOINING:
             if all(each.last_beat for each in self._processes if each.plays):
-                self._standby.start()  # not before: nodes that start need the processor more
+                self._standby.start()  # not before: nodes that start, and all that get to know them, need the processor
         if self._untidy and now - self._last_start > CALM:
             self._tidy_up()
         return said

@@ -260,16 +260,21 @@ class FaultTrial:
         watcher.motion = None
         came = self.go_on(lambda: self._in_graph(name) - known, 60.0)
         back = time.monotonic() - wall
-        moves = self.go_on(lambda: self._moves_again(begin, name), 60.0)
-        stamp = watcher.stamp
+        moves = self.go_on(lambda: watcher.over or self._moves_again(begin, name), 60.0)
+        stamp, scored = watcher.stamp, watcher.over
         samples = [sample for sample in watcher.samples if sample.stamp >= begin or stamp < begin]
+        if scored:  # the ball may have rolled on by itself: it is the next trial that tells
+            self._begin_anew()
+            moves = self.go_on(lambda: watcher.walks, 60.0)
         return {
             "node": name,
             "back [s]": round(back, 2) if came else None,
             "safe": lies_softly(samples),
             "upright": not any(sample.fallen for sample in samples),
             "plays on": moves,
-            "plays on after [s]": round((stamp - (begin if stamp > begin else 0)) / SECOND, 1) if moves else None,
+            "plays on after [s]": (
+                round((stamp - (begin if stamp > begin else 0)) / SECOND, 1) if moves and not scored else None
+            ),
         }
 
     def _moves_again(self, killed: int, name: str) -> bool:

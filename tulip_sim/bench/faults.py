@@ -97,8 +97,8 @@ def _killed(kills: Sequence[dict[str, Any]]) -> list[str]:
         "Each node is killed (SIGKILL) at random moments while the robot walks, in trials with camera. `back` is the"
         f" time until the new node is in the graph, wall clock; asked for: {SOON:g} s in the median. `safe`: upright,"
         " or on the ground without torque until people set it up; asked for: always. `plays on`: walks again in the"
-        " same match, in simulated time after the kill; after the driver's death in a new one, since the simulated"
-        " world died with it.",
+        " same trial, in simulated time after the kill, or in the next if a goal ended this one; after the driver's"
+        " death in a new one, since the simulated world died with it.",
         "",
         "| node | killed | back [s], median (greatest) | safe | of these upright | plays on"
         " | after [s], median (greatest) |",
