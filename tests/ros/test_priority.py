@@ -12,6 +12,7 @@ from tulip_ros.priority import GROUP, NICE
 
 PROGRAM = """
 import os
+from pathlib import Path
 from threading import Thread
 from tulip_ros.priority import give_way
 give_way()

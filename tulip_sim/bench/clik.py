@@ -30,7 +30,7 @@ BARS = (200.0, 500.0)  # [us] median and 99th percentile of a tick
 PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
     "state estimator": ((StateEstimator, "update"),),
     "gait": ((Motion, "_advance_gait"),),
-    "ground track": ((Motion, "_track_ground"),),
+    "ground track": ((Motion, "_follow"),),
     "balance": ((Motion, "_stabilize"), (tracking, "turn_for_balance")),
     "inverse kinematics (10)": tuple(
         (InverseKinematics, name) for name in ("update_jacobian", "solve_velocity", "integrate")
