@@ -204,6 +204,6 @@ class Launcher:
     def _tidy_up(self) -> None:
         """Remove the shared memory of nodes that were killed, beside the work."""
         if self._tidying is None or not self._tidying.is_alive():
-            self._tidying = Thread(target=transport.remove_leftovers)
+            self._tidying = Thread(target=transport.remove_dead_segments)
             self._tidying.start()
             self._untidy = False

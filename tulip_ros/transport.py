@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import re
 import shutil
@@ -64,6 +65,30 @@ def remove_leftovers() -> None:
             for leftover in (port, SHARED_MEMORY / f"sem.{port.name}_mutex"):
                 with contextlib.suppress(OSError):  # gone by now, or another user's
                     leftover.unlink()
+
+
+def remove_dead_segments() -> None:
+    """Remove most of what killed processes left, their segments, while others start and end.
+
+    A segment's name is drawn anew for each process, so none that starts can want it. Ports are let be: a node that is
+    started again takes up its predecessor's, and if that was removed at this very moment, nobody reaches it any more.
+    """
+    for path in leftovers():
+        lock = path.with_name(f"{path.name}_el")
+        if re.fullmatch(r"fastrtps_[0-9a-f]{16}", path.name) and not _is_locked(lock):
+            for leftover in (path, lock):
+                with contextlib.suppress(OSError):  # gone by now
+                    leftover.unlink()
+
+
+def _is_locked(path: Path) -> bool:
+    """Return whether a process holds the lock of what it has in shared memory, in a container of its own perhaps."""
+    try:
+        with open(path) as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:  # held; or not there, so that nothing is known
+        return True
+    return False
 
 
 def leftovers() -> set[Path]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import socket
@@ -101,6 +102,19 @@ def test_shared_memory_of_a_dead_process_is_told_and_that_of_a_living_one_is_not
     assert room.level == OK
     assert left.level == WARNING and left.words.startswith("2 files of dead processes") and "--mend" in left.words
     assert (tmp_path / "fastrtps_dead").exists()  # only told
+
+
+def test_segments_of_dead_processes_go_at_once_and_ports_and_what_is_locked_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(transport, "SHARED_MEMORY", tmp_path)
+    dead, alive, port = "fastrtps_00000000000000aa", "fastrtps_00000000000000bb", "fastrtps_port7411"
+    for name in (dead, f"{dead}_el", alive, f"{alive}_el", port, f"{port}_el"):
+        (tmp_path / name).write_bytes(bytes(16))
+    with open(tmp_path / f"{alive}_el") as lock:  # as Fast DDS does, also in a container where nobody sees who maps it
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        transport.remove_dead_segments()
+        assert {path.name for path in tmp_path.iterdir()} == {alive, f"{alive}_el", port, f"{port}_el"}
 
 
 def test_little_shared_memory_is_a_warning_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
