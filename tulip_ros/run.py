@@ -24,6 +24,7 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from time import monotonic
@@ -189,6 +190,8 @@ def session(
     if choice not in EXECUTORS:
         raise unknown("executor", choice, EXECUTORS)
     transport.use_profile()
+    if not handle_signals:  # a program with words of its own; who asked asks again, or says that no answer came
+        warnings.filterwarnings("ignore", "failed to send response", RuntimeWarning)
     try:
         rclpy.init(
             args=list(sys.argv if arguments is None else arguments),

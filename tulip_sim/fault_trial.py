@@ -6,6 +6,8 @@ import os
 import resource
 import signal
 import time
+from bisect import bisect_left
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +16,9 @@ from typing import Any, NamedTuple
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 
+from tulip_description.robot import LEG_PARTS, SIDES
+from tulip_driver.guard import GuardParameters
+from tulip_motion.parameters import MotionParameters
 from tulip_msgs.msg import Decision, MotionState
 from tulip_ros import topics
 from tulip_ros.launch import HUNG, Launcher
@@ -38,7 +43,14 @@ RULES = {
 """Play begins soon, and goes on and on."""
 SLOW = 0.25  # times real time, where the simulation does not wait: no message is late by the machine's fault
 END = 2.0  # [s] at the end of what is watched, in which a robot that stands or is limp does nothing else
-SOFT = 8.0  # [N m] least torque in the legs that is more than damping of what still rolls
+SOFT = 2.0  # [N m] least torque in a leg that is not damping: of what still rolls, 0.4 were seen
+MOST_DAMPING = {  # [N m s/rad] of a limp leg, by motion control, or by the driver while motion control is silent
+    f"{side}_{part}": max(of_motion, of_driver)
+    for side in SIDES
+    for part, of_motion, of_driver in zip(
+        LEG_PARTS, MotionParameters().limp_damping, GuardParameters().damping, strict=True
+    )
+}
 SILENT = 0.3  # [s] without news of motion control, after which it is not known to do anything
 SILENCE = 90.0  # [s] of wall-clock time without the simulator, after which the trial is given up
 STOPPED, RUNNING = 0.06, 0.04  # [s] of wall-clock time that a slow node is stopped, and runs, in turn
@@ -58,7 +70,7 @@ class Sample(NamedTuple):
     Attributes:
         stamp: [ns].
         mode: Of motion control, None while it says nothing.
-        torque: Greatest in a leg since the sample before [N m].
+        torque: Greatest of a leg's joints since the sample before, less what may be damping [N m].
         fallen: Whether it lies, in truth.
         plays: Whether strategy has decided lately, and not only to stand.
     """
@@ -88,7 +100,8 @@ class FaultWatcher(TrialWatcher):
         super().begin_anew()
         self.samples: list[Sample] = []
         self.motion: MotionState | None = None
-        self._torque = 0.0
+        self._ahead: deque[tuple[int, float]] = deque()  # stamps [ns] after the last sample's, and torques [N m]
+        self._speeds: dict[str, float] = {}
         self._decided = -SECOND
 
     @property
@@ -111,12 +124,19 @@ class FaultWatcher(TrialWatcher):
         self.motion = message
 
     def _on_joints(self, message: JointState) -> None:
-        efforts = [
-            abs(effort)
-            for name, effort in zip(message.name, message.effort, strict=True)
-            if not name.startswith("head")
-        ]
-        self._torque = max(self._torque, *efforts)
+        stamp, torque = stamp_of(message), 0.0
+        before, self._speeds = self._speeds, {}
+        for name, speed, effort in zip(message.name, message.velocity, message.effort, strict=True):
+            if name in MOST_DAMPING:
+                self._speeds[name] = abs(speed)
+                most = max(abs(speed), before.get(name, 0.0))  # the effort is a mean since the message before
+                torque = max(torque, abs(effort) - MOST_DAMPING[name] * most)
+        # Topics overtake each other where the processor is short: each torque goes to the sample of its own time.
+        place = bisect_left(self.samples, stamp, key=lambda sample: sample.stamp)
+        if place == len(self.samples):
+            self._ahead.append((stamp, torque))
+        elif torque > self.samples[place].torque:
+            self.samples[place] = self.samples[place]._replace(torque=torque)
 
     def _on_truth(self, message: Any) -> None:
         super()._on_truth(message)
@@ -124,8 +144,10 @@ class FaultWatcher(TrialWatcher):
         silent = motion is None or now - stamp_of(motion) > SILENT * SECOND
         mode = None if silent or motion is None else int(motion.mode)
         plays = now - self._decided < SECOND and self.doing.startswith(PLAYING)
-        self.samples.append(Sample(now, mode, self._torque, bool(message.robot_fallen), plays))
-        self._torque = 0.0
+        torque = 0.0
+        while self._ahead and self._ahead[0][0] <= now:
+            torque = max(torque, self._ahead.popleft()[1])
+        self.samples.append(Sample(now, mode, torque, bool(message.robot_fallen), plays))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -148,7 +170,7 @@ def reaction_of(samples: Sequence[Sample]) -> Reaction | None:
 
 
 def lies_softly(samples: Sequence[Sample]) -> bool:
-    """Return whether a robot that lies has no torque in its legs, from a second after its fall on."""
+    """Return whether the legs of a robot that lies only damp, from a second after its fall on."""
     since: int | None = None
     for sample in samples:
         since = None if not sample.fallen else sample.stamp if since is None else since

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import signal
 from pathlib import Path
+from typing import Any
 
 import pytest
+from sensor_msgs.msg import JointState
 
-from tulip_msgs.msg import MotionState, UserCommand
+from tulip_msgs.msg import GroundTruth, MotionState, UserCommand
 from tulip_ros import topics
-from tulip_ros.run import ComponentNode
+from tulip_ros.run import ComponentNode, session
+from tulip_ros.time import to_message
 from tulip_sim.bench.free_port import free_port
 from tulip_sim.fault_table import ROWS
-from tulip_sim.fault_trial import RULES, SECOND, FaultTrial, running
+from tulip_sim.fault_trial import MOST_DAMPING, RULES, SECOND, FaultTrial, FaultWatcher, running
 from tulip_sim.match_graph import trial_plan
 from tulip_sim.perception import PerceptionParameters
 from tulip_sim.trial import TrialObserver
@@ -32,6 +35,27 @@ def stands(trial: FaultTrial, seconds: float) -> bool:
     begin = trial.watcher.stamp
     trial.go_on(lambda: trial.watcher.stamp > begin + seconds * SECOND, seconds + 1.0)
     return all(each.mode == MotionState.STAND for each in trial.watcher.samples if each.stamp > begin)
+
+
+def test_torques_less_damping_go_to_the_sample_of_their_own_time_though_they_come_early_or_late() -> None:
+    def at(message: Any, hundredths: int) -> Any:
+        message.header.stamp = to_message(hundredths * SECOND // 100)
+        return message
+
+    with session(FaultWatcher, [], handle_signals=False) as (watcher, _):
+
+        def joints(hundredths: int, torque: float, damped: float = 0.0) -> None:
+            names, efforts = ["left_knee", "head_pan"], [-torque - damped, 99.0]
+            speeds = [damped / MOST_DAMPING["left_knee"], 0.0]
+            watcher._on_joints(at(JointState(name=names, velocity=speeds, effort=efforts), hundredths))
+
+        joints(101, 5.0)
+        joints(103, 60.0)  # before the truth of the instant before
+        for hundredths in (100, 102, 104, 106):
+            watcher._on_truth(at(GroundTruth(), hundredths))
+        joints(105, 7.0)
+        joints(106, 6.0, damped=20.0)
+        assert [sample.torque for sample in watcher.samples] == [0.0, 5.0, 60.0, 7.0]
 
 
 def test_killed_nodes_come_back_with_all_that_was_latched_or_known_and_a_stopped_one_lets_the_robot_stand(

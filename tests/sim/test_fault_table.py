@@ -36,12 +36,12 @@ def life(*parts: tuple[float, int | None, float, bool]) -> list[Sample]:
         (life((8.0, WALK, 30.0, False)), Reaction.GOES_ON),
         (life((5.0, WALK, 30.0, False), (3.0, STAND, 10.0, False), (0.5, WALK, 30.0, False)), Reaction.GOES_ON),
         (life((5.0, WALK, 30.0, False), (3.0, STAND, 10.0, False)), Reaction.STANDS),
-        (life((1.0, WALK, 30.0, False), (3.0, FALLEN, 2.0, True)), Reaction.LIMP),
-        (life((1.0, WALK, 30.0, False), (3.0, None, 2.0, True)), Reaction.LIMP),
-        (life((1.0, WALK, 30.0, False), (3.0, FALLEN, 2.0, False)), Reaction.LIMP),  # it sank, and leans on something
+        (life((1.0, WALK, 30.0, False), (3.0, FALLEN, 0.2, True)), Reaction.LIMP),
+        (life((1.0, WALK, 30.0, False), (3.0, None, 0.2, True)), Reaction.LIMP),
+        (life((1.0, WALK, 30.0, False), (3.0, FALLEN, 0.2, False)), Reaction.LIMP),  # it sank, and leans on something
         (life((1.0, WALK, 30.0, False), (3.0, None, 30.0, False)), None),  # nobody knows, and there is torque
         (life((1.0, WALK, 30.0, False), (3.0, WALK, 30.0, True)), None),  # walks lying
-        (life((1.0, WALK, 30.0, False), (2.0, FALLEN, 2.0, True), (3.0, WALK, 30.0, False)), None),  # fell, was set up
+        (life((1.0, WALK, 30.0, False), (2.0, FALLEN, 0.2, True), (3.0, WALK, 30.0, False)), None),  # fell, was set up
         (life((1.0, WALK, 30.0, False), (3.0, FALLEN, 20.0, True)), None),  # has torque where it should have none
         ([], None),
     ],
@@ -59,8 +59,8 @@ def test_who_stands_to_look_for_the_ball_plays_and_who_walks_on_without_being_to
 
 def test_a_robot_lies_softly_without_torque_from_a_second_after_its_fall_on() -> None:
     assert lies_softly(life((3.0, WALK, 30.0, False)))
-    assert lies_softly(life((1.0, WALK, 30.0, False), (0.9, FALLEN, 30.0, True), (3.0, FALLEN, 2.0, True)))
-    assert not lies_softly(life((1.0, WALK, 30.0, False), (2.0, FALLEN, 2.0, True), (0.1, WALK, 2 * SOFT, True)))
+    assert lies_softly(life((1.0, WALK, 30.0, False), (0.9, FALLEN, 30.0, True), (3.0, FALLEN, 0.2, True)))
+    assert not lies_softly(life((1.0, WALK, 30.0, False), (2.0, FALLEN, 0.2, True), (0.1, WALK, 2 * SOFT, True)))
 
 
 def test_each_row_can_be_made_to_happen() -> None:

@@ -1,7 +1,7 @@
 """Every fault of the table happens while the robot walks: what does it do? And each node is killed, again and again.
 
 A row of the table is compared with what is stated there. A node that was killed has to be back in the graph soon; the
-robot has to stay upright, or lie without torque until people have set it up; and it has to play on.
+robot has to stay upright, or lie with legs that only damp until people have set it up; and it has to play on.
 """
 
 from __future__ import annotations
@@ -96,9 +96,9 @@ def _killed(kills: Sequence[dict[str, Any]]) -> list[str]:
     lines = [
         "Each node is killed (SIGKILL) at random moments while the robot walks, in trials with camera. `back` is the"
         f" time until the new node is in the graph, wall clock; asked for: {SOON:g} s in the median. `safe`: upright,"
-        " or on the ground without torque until people set it up; asked for: always. `plays on`: walks again in the"
-        " same trial, in simulated time after the kill, or in the next if a goal ended this one; after the driver's"
-        " death in a new one, since the simulated world died with it.",
+        " or on the ground until people set it up, with legs that only damp; asked for: always. `plays on`: walks"
+        " again in the same trial, in simulated time after the kill, or in the next if a goal ended this one; after the"
+        " driver's death in a new one, since the simulated world died with it.",
         "",
         "| node | killed | back [s], median (greatest) | safe | of these upright | plays on"
         " | after [s], median (greatest) |",
