@@ -15,11 +15,13 @@ from typer.testing import CliRunner
 
 from tulip_description.field import load_field
 from tulip_description.planar import Pose2D
+from tulip_msgs.msg import EmergencyStop
 from tulip_ros import topics
 from tulip_ros.bag import Bag
 from tulip_ros.errors import BadInputError
 from tulip_ros.log_edit import cut, writing
 from tulip_ros.log_file import Log
+from tulip_ros.time import stamp_of
 from tulip_sim.lockstep import Lockstep, Settings
 from tulip_sim.lockstep_notes import explain_trial
 from tulip_sim.lockstep_recording import LockstepRecording, RecordedPictures
@@ -195,6 +197,30 @@ def test_arrival_in_another_order_changes_nothing(without_pictures: Path, tmp_pa
     difference = outcome.differences["/world_state"]
     assert difference.recorded == difference.pairs == 200
     assert difference.equal >= 90
+
+
+def test_an_emergency_stop_in_the_recording_is_obeyed_until_its_release(without_pictures: Path, tmp_path: Path) -> None:
+    name, begin, end = "/emergency_stop", 15 * 10**8, 25 * 10**8
+    with Log(without_pictures) as log, writing(tmp_path / "stopped") as bag:
+        told = [(begin, EmergencyStop(engaged=True, sequence=1)), (end, EmergencyStop(engaged=False, sequence=2))]
+        bag.add_topic(name, topics.EMERGENCY_STOP.type_name, topics.EMERGENCY_STOP.quality)
+        for each in log.records():
+            while told and each.log_time > told[0][0]:
+                moment, word = told.pop(0)
+                bag.write(name, serialize_message(word), moment)
+            bag.copy(each)
+        bag.copy_notes(log)
+    with Log(tmp_path / "stopped") as log:
+        for component in ("strategy", "head"):
+            recompute(log, [component], tmp_path / component, judge=False)
+    with Log(tmp_path / "strategy") as log:
+        decisions = [log.decode(each) for each in log.records(["/decision"])]
+    # The release alone lets nobody play: the user has to say so.
+    assert all(each.tree.startswith("robot > limp") == (stamp_of(each) > begin) for each in decisions)
+    with Log(tmp_path / "head") as log:
+        heads = [log.decode(each) for each in log.records(["/head/joint_command"])]
+    assert all(np.any(each.stiffness) != (begin < stamp_of(each) <= end) for each in heads)
+    assert min(map(stamp_of, heads)) < begin and max(map(stamp_of, heads)) > end
 
 
 def test_features_keep_every_field_on_their_way_through_messages(without_pictures: Path) -> None:
