@@ -67,7 +67,8 @@ def mend() -> None:
             _environment.check_machine()
             _environment.set_up(())
         subprocess.run(
-            [interpreter(), "-c", "from tulip_ros import transport; transport.remove_leftovers()"], check=False
+            [interpreter(), "-c", "from tulip_ros import transport; transport.remove_leftovers(everywhere=True)"],
+            check=False,
         )
     except (_environment.SetupError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)  # the checks tell what is left

@@ -6,15 +6,14 @@ import contextlib
 import fcntl
 import os
 import re
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 PROFILE_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 SHARED_MEMORY = Path("/dev/shm")
 SEGMENT = 17 * 2**20  # [B] one process's shared memory: 16 MiB of messages and what Fast DDS adds
 PROCESSES = 12  # of one robot's graph with tools
+FIRST_PORT, PORTS = 7400, 250  # of RTPS: of domain 0, and how many each domain has
+LOCK = r"_(el|sl)$"  # at the end of the name of a segment's or port's lock
 NAMES = ("auto", "shared_memory", "udp")
 RANGE_VARIABLE, RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"
 """How far nodes look for others, and are found: DDS knows no password, so this machine alone by default."""
@@ -46,39 +45,46 @@ def use_profile(name: str = "auto") -> None:
     os.environ.setdefault(RANGE_VARIABLE, RANGE)
 
 
-def remove_leftovers() -> None:
+def remove_leftovers(everywhere: bool = False) -> None:
     """Remove shared memory of processes that were killed; what a living process holds stays.
 
-    Each killed process leaves 17 MB. Fast DDS's own tool tells by file locks which are dead; without the tool nothing
-    happens. The tool misses ports that other processes had open when one was killed: their users were counted, and the
-    count never comes to zero, though their owner removed its lock. Such a port that no process maps goes as well.
+    Each killed process leaves 17 MB. For a launcher, before its nodes start and after they have ended: a node that is
+    started again takes up its predecessor's port, and if that is removed at this very moment, nobody reaches the node
+    any more. Another launcher may have such a node, so that ports of other domains stay.
+
+    Args:
+        everywhere: Remove those as well.
     """
-    own = Path(sys.prefix) / "tools" / "fastdds" / "fastdds.py"
-    tool = shutil.which("fastdds")
-    command = [sys.executable, str(own)] if own.exists() else [tool] if tool else None
-    if command is None or not any(SHARED_MEMORY.glob("fastrtps_*")):
-        return
-    subprocess.run([*command, "shm", "clean"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
-    ports = {path for path in SHARED_MEMORY.glob("fastrtps_port*") if path.name[-1].isdigit()}
-    for port in ports - _mapped():
-        if not any(SHARED_MEMORY.glob(f"{port.name}_?l")):  # no lock
-            for leftover in (port, SHARED_MEMORY / f"sem.{port.name}_mutex"):
-                with contextlib.suppress(OSError):  # gone by now, or another user's
-                    leftover.unlink()
+    remove_dead_segments()
+    first = FIRST_PORT + PORTS * int(os.environ.get("ROS_DOMAIN_ID") or 0)
+    for name in _dead_names():
+        number = re.fullmatch(r"fastrtps_port(\d+)", name)
+        if number is None or not (everywhere or first <= int(number[1]) < first + PORTS):
+            continue
+        locks = list(SHARED_MEMORY.glob(f"{name}_?l"))
+        if not any(map(_is_locked, locks)):
+            _remove(name, *(lock.name for lock in locks), f"sem.{name}_mutex")
 
 
 def remove_dead_segments() -> None:
     """Remove most of what killed processes left, their segments, while others start and end.
 
-    A segment's name is drawn anew for each process, so none that starts can want it. Ports are let be: a node that is
-    started again takes up its predecessor's, and if that was removed at this very moment, nobody reaches it any more.
+    A segment's name is drawn anew for each process, so none that starts can want it.
     """
-    for path in leftovers():
-        lock = path.with_name(f"{path.name}_el")
-        if re.fullmatch(r"fastrtps_[0-9a-f]{16}", path.name) and not _is_locked(lock):
-            for leftover in (path, lock):
-                with contextlib.suppress(OSError):  # gone by now
-                    leftover.unlink()
+    for name in _dead_names():
+        if re.fullmatch(r"fastrtps_[0-9a-f]{16}", name) and not _is_locked(SHARED_MEMORY / f"{name}_el"):
+            _remove(name, f"{name}_el")
+
+
+def _dead_names() -> set[str]:
+    """Return the names of segments and ports that have leftovers, their locks perhaps alone."""
+    return {re.sub(LOCK, "", path.name) for path in leftovers()}
+
+
+def _remove(*names: str) -> None:
+    for name in names:
+        with contextlib.suppress(OSError):  # gone by now
+            (SHARED_MEMORY / name).unlink()
 
 
 def _is_locked(path: Path) -> bool:
@@ -95,7 +101,7 @@ def leftovers() -> set[Path]:
     """Return the files of Fast DDS in shared memory that no living process has open, as far as this user may look."""
     files = {path for path in SHARED_MEMORY.glob("fastrtps_*") if _owner(path) == os.getuid()}
     mapped = {path.name for path in _mapped()}
-    return {path for path in files if re.sub(r"_(el|sl)$", "", path.name) not in mapped}
+    return {path for path in files if re.sub(LOCK, "", path.name) not in mapped}
 
 
 def _owner(path: Path) -> int | None:

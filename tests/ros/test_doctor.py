@@ -117,6 +117,25 @@ def test_segments_of_dead_processes_go_at_once_and_ports_and_what_is_locked_stay
         assert {path.name for path in tmp_path.iterdir()} == {alive, f"{alive}_el", port, f"{port}_el"}
 
 
+def test_a_dead_port_goes_with_all_that_belongs_to_it_and_those_of_other_domains_only_on_request(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(transport, "SHARED_MEMORY", tmp_path)
+    monkeypatch.setenv("ROS_DOMAIN_ID", "2")
+    dead, bare, alive, other = (f"fastrtps_port{number}" for number in (7900, 8149, 7911, 8150))
+    locks = {dead: f"{dead}_el", alive: f"{alive}_sl", other: f"{other}_el"}
+    mutexes = {name: f"sem.{name}_mutex" for name in (dead, bare, alive, other)}
+    for name in (*mutexes, *mutexes.values(), *locks.values(), "fastrtps_port7913_el", "fastrtps_00000000000000aa_el"):
+        (tmp_path / name).write_bytes(bytes(16))
+    of_alive, of_other = {alive, locks[alive], mutexes[alive]}, {other, locks[other], mutexes[other]}
+    with open(tmp_path / locks[alive]) as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        transport.remove_leftovers()
+        assert {path.name for path in tmp_path.iterdir()} == of_alive | of_other
+        transport.remove_leftovers(everywhere=True)
+        assert {path.name for path in tmp_path.iterdir()} == of_alive
+
+
 def test_little_shared_memory_is_a_warning_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(transport, "SEGMENT", 2**60)
     found = next(installation.shared_memory())
