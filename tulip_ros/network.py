@@ -19,12 +19,12 @@ from xml.etree import ElementTree
 
 from tulip_ros import transport
 from tulip_ros.errors import BadInputError
+from tulip_ros.ports import GRAPH_PORTS, own_ports
 
 OPTION = "--network"
 METAVAR = "PEER[,PEER]"
 HELP = "The graph's other computers, which it is opened to: addresses or names, as in 192.168.8.2,robot.local."
 PEERS_VARIABLE = "ROS_STATIC_PEERS"
-DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
 NAME = re.compile(r"([a-z0-9_]([a-z0-9_-]*[a-z0-9])?\.)*[a-z0-9_]*[a-z_]([a-z0-9_-]*[a-z0-9])?\.?", re.IGNORECASE)
 """A computer's name: the last part is no number, or it would be a torn address."""
 SCHEMA = "http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"
@@ -44,26 +44,6 @@ class Peer(NamedTuple):
     name: str
     address: str
     own: str
-
-
-class Ports(NamedTuple):
-    """UDP ports, from first to last."""
-
-    first: int
-    last: int
-
-
-GRAPH_PORTS = Ports(7000, 7399)
-"""By which each process learns who has which topics: the first that is free, in every domain."""
-
-
-def domain_ports(domain: int) -> Ports:
-    """Return the ports of a domain's discovery and data (DDSI-RTPS 2.2, 9.6.1.1).
-
-    Args:
-        domain: As in ROS_DOMAIN_ID.
-    """
-    return Ports(7400 + 250 * domain, 7649 + 250 * domain)
 
 
 def find_peers(names: str) -> tuple[Peer, ...]:
@@ -168,8 +148,7 @@ def join(names: str, transport_name: str = "auto") -> None:
     os.environ[transport.PROFILE_VARIABLE] = str(_kept(profile(transport_name, own)))
     os.environ[transport.RANGE_VARIABLE] = transport.RANGE
     os.environ[PEERS_VARIABLE] = ";".join(peer.address for peer in peers)
-    domain = os.environ.get(DOMAIN_VARIABLE, "")
-    ports, graph = domain_ports(int(domain) if domain.isdecimal() else 0), GRAPH_PORTS  # ROS refuses any other
+    ports, graph = own_ports(), GRAPH_PORTS
     print(
         f"network: looks for nodes on {', '.join(_told(peer.name, peer.address) for peer in peers)}; UDP"
         f" {ports.first}-{ports.last} and {graph.first}-{graph.last} of {', '.join(own)} are open, without password, to"

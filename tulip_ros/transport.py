@@ -8,11 +8,12 @@ import os
 import re
 from pathlib import Path
 
+from tulip_ros.ports import GRAPH_PORTS, own_ports
+
 PROFILE_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 SHARED_MEMORY = Path("/dev/shm")
 SEGMENT = 17 * 2**20  # [B] one process's shared memory: 16 MiB of messages and what Fast DDS adds
 PROCESSES = 12  # of one robot's graph with tools
-FIRST_PORT, PORTS = 7400, 250  # of RTPS: of domain 0, and how many each domain has
 LOCK = r"_(el|sl)$"  # at the end of the name of a segment's or port's lock
 NAMES = ("auto", "shared_memory", "udp")
 RANGE_VARIABLE, RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"
@@ -50,16 +51,16 @@ def remove_leftovers(everywhere: bool = False) -> None:
 
     Each killed process leaves 17 MB. For a launcher, before its nodes start and after they have ended: a node that is
     started again takes up its predecessor's port, and if that is removed at this very moment, nobody reaches the node
-    any more. Another launcher may have such a node, so that ports of other domains stay.
+    any more. Another launcher may have such a node: ports of other domains stay, but those that all domains share.
 
     Args:
-        everywhere: Remove those as well.
+        everywhere: Remove ports of all domains.
     """
     remove_dead_segments()
-    first = FIRST_PORT + PORTS * int(os.environ.get("ROS_DOMAIN_ID") or 0)
+    own = own_ports()
     for name in _dead_names():
         number = re.fullmatch(r"fastrtps_port(\d+)", name)
-        if number is None or not (everywhere or first <= int(number[1]) < first + PORTS):
+        if number is None or not (everywhere or int(number[1]) in own or int(number[1]) in GRAPH_PORTS):
             continue
         locks = list(SHARED_MEMORY.glob(f"{name}_?l"))
         if not any(map(_is_locked, locks)):

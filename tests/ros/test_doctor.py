@@ -122,9 +122,9 @@ def test_a_dead_port_goes_with_all_that_belongs_to_it_and_those_of_other_domains
 ) -> None:
     monkeypatch.setattr(transport, "SHARED_MEMORY", tmp_path)
     monkeypatch.setenv("ROS_DOMAIN_ID", "2")
-    dead, bare, alive, other = (f"fastrtps_port{number}" for number in (7900, 8149, 7911, 8150))
-    locks = {dead: f"{dead}_el", alive: f"{alive}_sl", other: f"{other}_el"}
-    mutexes = {name: f"sem.{name}_mutex" for name in (dead, bare, alive, other)}
+    shared, dead, bare, alive, other = (f"fastrtps_port{number}" for number in (7000, 7900, 8149, 7911, 8150))
+    locks = {shared: f"{shared}_el", dead: f"{dead}_el", alive: f"{alive}_sl", other: f"{other}_el"}
+    mutexes = {name: f"sem.{name}_mutex" for name in (shared, dead, bare, alive, other)}
     for name in (*mutexes, *mutexes.values(), *locks.values(), "fastrtps_port7913_el", "fastrtps_00000000000000aa_el"):
         (tmp_path / name).write_bytes(bytes(16))
     of_alive, of_other = {alive, locks[alive], mutexes[alive]}, {other, locks[other], mutexes[other]}

@@ -16,7 +16,7 @@ import doctor
 import pytest
 from rclpy.node import Node
 
-from tulip_ros import network, transport
+from tulip_ros import network, ports, transport
 from tulip_ros.errors import BadInputError
 from tulip_ros.nodes import LOOKERS, NODES
 from tulip_ros.run import session
@@ -131,7 +131,7 @@ def _has(element: ElementTree.Element, tag: str, text: str) -> bool:
 def test_joining_sets_what_ros_reads_and_says_what_is_open_to_whom(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setenv(network.DOMAIN_VARIABLE, "43")
+    monkeypatch.setenv(ports.DOMAIN_VARIABLE, "43")
     network.join("robot.local,192.0.2.9")
     (line,) = capsys.readouterr().err.splitlines()
     assert "nodes on robot.local (192.0.2.7), 192.0.2.9; UDP 18150-18399 and 7000-7399 of 192.0.2.1 are open" in line
@@ -192,9 +192,9 @@ def test_the_doctor_refuses_a_peer_that_is_none(
 
 
 def test_ports_of_domains_do_not_overlap_and_follow_the_standard() -> None:
-    assert network.domain_ports(0) == (7400, 7649)
-    assert network.domain_ports(1).first == network.domain_ports(0).last + 1
-    assert network.GRAPH_PORTS.last + 1 == network.domain_ports(0).first
+    assert ports.domain_ports(0) == (7400, 7649)
+    assert ports.domain_ports(1).first == ports.domain_ports(0).last + 1
+    assert ports.GRAPH_PORTS.last + 1 == ports.domain_ports(0).first
 
 
 def test_nodes_that_only_look_are_nodes_and_none_of_them_plays() -> None:
@@ -208,7 +208,7 @@ def test_what_nodes_listen_on_is_bound_to_loopback_by_default(ros_domain: int) -
         lines = [line.split() for line in Path("/proc/self/net/udp").read_text().splitlines()[1:]]
         own = [fields[1].split(":") for fields in lines if f"socket:[{fields[9]}]" in inodes]
     # Sockets at other ports are those that it sends from.
-    listened = [network.domain_ports(ros_domain), network.GRAPH_PORTS]
+    listened = [ports.domain_ports(ros_domain), ports.GRAPH_PORTS]
     bound = [address for address, port in own if any(each.first <= int(port, 16) <= each.last for each in listened)]
     assert len(bound) >= 2 and set(bound) == {"0100007F"}
 
