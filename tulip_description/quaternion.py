@@ -9,12 +9,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from tulip_description.planar import Pose2D
 
 Quaternion = tuple[float, float, float, float]
 """x, y, z, w; of unit length."""
+ORIGIN = np.zeros(3)
 
 
 def quaternion_product(a: Sequence[float], b: Sequence[float]) -> Quaternion:
@@ -45,6 +47,12 @@ def quaternion_matrix(a: Sequence[float]) -> NDArray[np.float64]:
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def matrix_quaternion(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the quaternion (4,) of a rotation matrix (3, 3)."""
+    quaternion: NDArray[np.float64] = pin.SE3ToXYZQUAT(pin.SE3(matrix, ORIGIN))[3:]
+    return quaternion
 
 
 def pose_on_ground(

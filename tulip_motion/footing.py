@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from tulip_description.planar import Pose2D
+from tulip_description.quaternion import matrix_quaternion
 from tulip_description.robot import Foot
 from tulip_description.robot_io import Sensors
 from tulip_description.short_numbers import significant
@@ -133,7 +133,7 @@ class Footing:
         return Odometry(
             stamp,
             position,
-            pin.Quaternion(self._tilt.corrected(estimate.base_rotation)).coeffs(),
+            matrix_quaternion(self._tilt.corrected(estimate.base_rotation)),
             rotation_z(-yaw) @ estimate.base_velocity,
             estimate.base_rotation.T @ estimate.angular_velocity,
             reckoning.distance,

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from tulip_description import frames
 from tulip_description.planar import Pose2D
+from tulip_description.quaternion import matrix_quaternion
 from tulip_motion.gait import FootMotion
 from tulip_motion.interface import Side
 
@@ -243,7 +244,7 @@ class InverseKinematics:
     def reset(self, base_rotation: Array, base_position: Array, joint_positions: Array) -> None:
         """Set the posture that the integration goes on from."""
         self.configuration[:3] = base_position
-        self.configuration[3:7] = pin.Quaternion(base_rotation).coeffs()
+        self.configuration[3:7] = matrix_quaternion(base_rotation)
         self.configuration[7:] = joint_positions
         self.velocity[:] = 0.0
         self._weakest[:], self._singular_value = math.nan, 0.0

@@ -205,7 +205,7 @@ class Tracking:
         sole = data.oMf[kinematics.sole_frames[stance.side]]
         anchored = pin.SE3(rotation_z(stance.pose.yaw), np.array([stance.pose.x, stance.pose.y, 0.0]))
         base = anchored * sole.inverse() * data.oMi[1]
-        q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
+        q[:7] = pin.SE3ToXYZQUAT(base)
 
     def _torso_may_lean(self, reference: Reference) -> bool:
         """Return whether accelerations lead the torso, upright or where balance wants it; else the joints hold it."""

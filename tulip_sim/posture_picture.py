@@ -46,9 +46,9 @@ def posture_picture(robot: Robot, postures: Sequence[StaticPosture]) -> Picture:
         q[7:] = posture.joint_positions
         pin.framesForwardKinematics(model, data, q)
         base = data.oMf[model.getFrameId(LEFT_SOLE if posture.side == "left" else RIGHT_SOLE)].inverse()
-        turn = pin.Quaternion(base.rotation).coeffs()
+        place = pin.SE3ToXYZQUAT(base)
         truth = replace(
-            blank, base_position=base.translation, base_orientation=turn, joint_positions=posture.joint_positions
+            blank, base_position=place[:3], base_orientation=place[3:], joint_positions=posture.joint_positions
         )
         pictures.append(spectator.render(truth, look_at(EYE, AIM)))
     return np.hstack(pictures)

@@ -82,7 +82,7 @@ class BodyOnFeet:
         q[:3], q[3:7], q[7:] = 0.0, (0.0, 0.0, 0.0, 1.0), sensors.joint_positions[:12]
         pin.framesForwardKinematics(model, data, q)
         base = data.oMf[kinematics.sole_frames[stance]].inverse()
-        q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).coeffs()
+        q[:7] = pin.SE3ToXYZQUAT(base)
         kinematics.update_jacobian(stance)
         self.loads = sensors.foot_cells.sum(axis=1)
         soles = [data.oMf[frame] for frame in kinematics.sole_frames]
