@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 from std_srvs.srv import Trigger
 
+from tulip_description.emergency_stop import StopWord
 from tulip_description.robot import load_robot
 from tulip_motion.identification.experiment_plan import PlanParameters
 from tulip_motion.identification.experiment_settings import ExperimentSettings
+from tulip_motion.identification.identify_node import TOLD_LIMP, IdentifyNode
 from tulip_motion.identification.passages import Doing
 from tulip_motion.identification.progress import Progress
 from tulip_motion.lipm import GRAVITY
+from tulip_msgs.msg import UserCommand
 from tulip_ros import topics
 from tulip_ros.errors import BadInputError
 from tulip_ros.launch import Launcher
@@ -96,3 +99,12 @@ def test_node_that_waits_stands_until_the_service_begins_the_experiment(tmp_path
 def test_secret_body_without_a_simulated_robot_is_refused(driver: str, tmp_path: Path):
     with pytest.raises(BadInputError, match=f"expected --driver sim with it, not {driver}"):
         experiment_nodes(ExperimentSettings(), driver, 1, tmp_path, SECRET)
+
+
+def test_an_emergency_stop_is_the_reason_though_the_wish_that_follows_from_it_may_come_first():
+    with session(IdentifyNode, arguments=[], handle_signals=False) as (node, _):
+        node._on_user_command(UserCommand(request=UserCommand.LIMP))
+        assert node._experiment.reason == TOLD_LIMP
+        stop = StopWord(True, "menu", "key l", 0, 1)
+        node._on_emergency_stop(stop)
+        assert node._experiment.is_limp and node._experiment.reason == str(stop)

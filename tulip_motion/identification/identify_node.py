@@ -82,6 +82,8 @@ class IdentifyNode(ComponentNode):
 
     def _on_emergency_stop(self, word: StopWord) -> None:
         if word.engaged:
+            if self._experiment.reason == TOLD_LIMP:  # at a stop node user_input wishes so, too, and was quicker
+                self._experiment.reason = str(word)
             self._experiment.go_limp(str(word))
 
     def _make_experiment(self, plans: Sequence[FootPlan]) -> Experiment:
