@@ -37,6 +37,12 @@ def stands(trial: FaultTrial, seconds: float) -> bool:
     return all(each.mode == MotionState.STAND for each in trial.watcher.samples if each.stamp > begin)
 
 
+def localization_error(trial: FaultTrial, seconds: float) -> float:
+    trial.watcher.observer, begin = TrialObserver(), trial.watcher.stamp
+    trial.go_on(lambda: trial.watcher.stamp > begin + seconds * SECOND, seconds + 1.0)
+    return trial.watcher.observer.localization_error
+
+
 def test_torques_less_damping_go_to_the_sample_of_their_own_time_though_they_come_early_or_late() -> None:
     def at(message: Any, hundredths: int) -> Any:
         message.header.stamp = to_message(hundredths * SECOND // 100)
@@ -70,10 +76,11 @@ def test_killed_nodes_come_back_with_all_that_was_latched_or_known_and_a_stopped
             assert trial.process(node).restarts == 1
         # It knows the user's wish, the game and its own place: else it would not play on where it was.
         trial.walk()
-        trial.watcher.observer = TrialObserver()  # while people carried it, if it fell, it could not know its place
-        begin = trial.watcher.stamp
-        trial.go_on(lambda: trial.watcher.stamp > begin + 2 * SECOND, 10.0)
-        assert trial.watcher.observer.localization_error < 0.5
+        # While people carried it, if it fell, it could not know its place, and may have to look around first.
+        errors = [localization_error(trial, 2.0)]
+        while errors[-1] >= 0.5 and len(errors) < 8:
+            errors.append(localization_error(trial, 2.0))
+        assert errors[-1] < 0.5, (errors, killed)
 
         row = next(row for row in ROWS if row.name == "strategy stopped")
         found = trial.react(row)
