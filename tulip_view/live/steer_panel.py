@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from html import escape
+from threading import Lock
 
 import viser
 
@@ -17,6 +19,7 @@ from tulip_view.user_calls import UserCalls
 WIDTH = 270  # [px]
 STOP, RELEASE = "EMERGENCY STOP", "Release"
 AS_IT_IS = "as it is"
+KEPT = 2  # outcomes in sight: the answer to an older wish may come after the emergency stop and must not hide it
 
 
 class SteerPanel:
@@ -31,6 +34,8 @@ class SteerPanel:
             heading: Returns where the robot looks in the map [rad].
         """
         self._calls = calls
+        self._outcomes: deque[Outcome] = deque(maxlen=KEPT)
+        self._telling = Lock()  # answers come in the node's thread, the emergency stop's outcome in the page's
         gui = server.gui
         always = gui.add_panel()
         with always.add_tab("Steer"):
@@ -88,8 +93,11 @@ class SteerPanel:
         end.on_click(lambda _: calls().record(False))
 
     def tell(self, outcome: Outcome) -> None:
-        """Show what came of a wish."""
-        self._answer.content = STYLE.format(f"<b>{escape(str(outcome))}</b>")
+        """Show what came of a wish, and below it what was shown before."""
+        with self._telling:
+            self._outcomes.appendleft(outcome)
+            lines = "<br>".join(escape(str(each)) for each in self._outcomes)
+            self._answer.content = STYLE.format(f"<b>{lines}</b>")
 
     def _on(self, button: viser.GuiButtonHandle, wish: Wish) -> None:
         button.on_click(lambda _: self._calls().wish(wish))
