@@ -360,7 +360,7 @@ START_POSE = Topic(
     LATCHED,
     ("driver",),
     ("worldmodel",),
-    "base_footprint in map, where people have set the robot down during a match; viewers send it, too",
+    "base_footprint in map, where people have set the robot down since the first world began; viewers send it, too",
 )
 REPORT = Topic(
     "referee/report", String, LATCHED, ("driver",), (), "match of two robots: all that the referee has said, as JSON"

@@ -87,9 +87,12 @@ class DriverNode(SimulatorNode):
             (topics.PUSH, self._on_push),
         ):
             self.create_service(service.type, service.name, answer)
-        self._crew = Crew(self, "") if p.hands else None
+        self._crew = Crew(self, "")
         self._wish: tuple[str, int] | None = None  # scenario and seed to begin anew with
         self._begin(p.scenario, p.seed)
+        if self.keepsake.read():  # the robot has played in another world, until this node died
+            self._tell_start()
+        self.keepsake.keep({"began": True})
 
     def _begin(self, scenario: str, seed: int) -> None:
         self._scenario_name = scenario
@@ -100,6 +103,10 @@ class DriverNode(SimulatorNode):
         self.begin_world(World(start, world, seed, self._field, self._robot, true_body=body), [[seed, 1]])
         self._hands = Hands(self.world, self)
         self._fell: int | None = None  # stamp [ns] since when the robot lies
+
+    def _tell_start(self) -> None:
+        """Tell the robot where it stands in its new world; in the first one its parameters say so."""
+        self._crew.tell_place(self.world.scenario.robot)
 
     @property
     def interrupted(self) -> bool:
@@ -112,6 +119,7 @@ class DriverNode(SimulatorNode):
             wish, self._wish = self._wish, None
             self.world.close()
             self._begin(*wish)
+            self._tell_start()
         super().advance(spin)
 
     def judge(self, spin: Spin) -> list[tuple[Truth, Verdict]]:
@@ -119,9 +127,9 @@ class DriverNode(SimulatorNode):
         self._hands.move()
         truth = self.world.truth()
         packet = self._referee.update(truth)
-        if self._crew is not None:
+        if self._settings.hands:
             self._help(truth)
-            self._crew.speak(spin, self._settings.answer_bound)
+        self._crew.speak(spin, self._settings.answer_bound)
         if packet is not None and self._referee_socket is not None:
             self._referee_socket.send(packet)
             hear_replies(self._referee_socket, self.health)
@@ -152,12 +160,10 @@ class DriverNode(SimulatorNode):
 
     def tell_place(self, robot: int, pose: Pose2D) -> None:
         """Tell the robot where it stands."""
-        if self._crew is not None:
-            self._crew.tell_place(pose)
+        self._crew.tell_place(pose)
 
     def _want(self, request: UserRequest) -> None:
-        if self._crew is not None:
-            self._crew.want(request)
+        self._crew.want(request)
 
     def _on_reset(self, request: Reset.Request, response: Reset.Response) -> Reset.Response:
         name = request.scenario or self._scenario_name

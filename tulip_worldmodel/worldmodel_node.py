@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry as OdometryMessage
@@ -48,8 +49,11 @@ class WorldModelNode(ComponentNode):
         super().__init__("worldmodel")
         p = self._settings = self.load(WorldModelNodeParameters())
         self._start = Pose2D(p.start_x, p.start_y, p.start_yaw)
-        self._before = self.keepsake.read()  # where the robot was when this node died
+        self._before: dict[str, Any] = {}
         self.begin_anew()
+        self._before = self.keepsake.read()  # where the robot was when this node died
+        # Stamp [ns], x, y [m] and yaw [rad] of the start pose that was used last, and that comes once more if latched.
+        self._told = self._latched = self._before.get("told", [])
         self._world_state = self.sender(topics.WORLD_STATE)
         self._robot_pose = self.sender(topics.ROBOT_POSE)
         self._transforms = self.sender(topics.TF)
@@ -65,6 +69,7 @@ class WorldModelNode(ComponentNode):
         except FieldError as error:
             raise BadInputError(f"Parameter field_file of node 'worldmodel': {error}") from error
         self._world = WorldModel(p, field.turned() if p.field_turned else field, self._start)
+        self._before = {}  # counts no more
         self._last_published: int | None = None  # stamp [ns]
         self._newest: int | None = None  # stamp of the newest odometry [ns]
 
@@ -92,20 +97,19 @@ class WorldModelNode(ComponentNode):
         if pose is None:
             self.health.count("bad start poses", "initialpose holds no pose on the ground; expected finite numbers")
             return
-        if stamp_of(message) <= self._before.get("stamp", -1):
-            return  # latched: it was used before this node died
-        self._start = pose
-        self.begin_anew()
+        latched, self._latched = self._latched, []
+        self._start, self._told = pose, [stamp_of(message), *pose.as_array().tolist()]
+        if self._told != latched:  # else it was used before this node died
+            self.begin_anew()
 
     def _go_on_from_before(self, odometry: Odometry) -> None:
-        """Begin where the robot has come to since this node died, unless time began anew."""
-        if odometry.stamp < self._before.get("stamp", odometry.stamp + 1):
+        """Begin where the robot has come to since this node died; where it was set down if time began anew."""
+        before, start = self._before, self._start
+        if not before:
             return
-        then, in_map = (Pose2D(*self._before[name]) for name in ("odom", "map"))
-        start, self._start = (
-            self._start,
-            in_map @ then.inverse() @ pose_on_ground(odometry.position, odometry.orientation),
-        )
+        if odometry.stamp >= before["stamp"]:
+            then, in_map = (Pose2D(*before[name]) for name in ("odom", "map"))
+            self._start = in_map @ then.inverse() @ pose_on_ground(odometry.position, odometry.orientation)
         self.begin_anew()
         self._start = start
 
@@ -115,7 +119,7 @@ class WorldModelNode(ComponentNode):
         self._world_state.publish(world_state_to_message(world))
         robot = world.robot
         poses = {"map": robot.pose.as_array().tolist(), "odom": robot.pose_in_odom.as_array().tolist()}
-        self.keepsake.keep({"stamp": world.stamp, **poses})
+        self.keepsake.keep({"stamp": world.stamp, "told": self._told, **poses})
         self._robot_pose.publish(robot_pose_to_message(world))
         self._transforms.publish(map_to_odom_message(world))
 

@@ -8,7 +8,7 @@ import signal
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from tulip_msgs.msg import Features, GameState, MotionState
 from tulip_ros import topics
 from tulip_ros.launch import Launcher
+from tulip_ros.ports import GRAPH_PORTS, own_ports
 from tulip_ros.run import session
 from tulip_ros.transport import SHARED_MEMORY
 from tulip_sim.match_graph import TrialWatcher, trial_plan
@@ -25,6 +26,7 @@ SOON = {"initial_time": 0.5, "ready_time": 0.5, "set_time": 1.0}
 """Times of the referee [s]: play begins soon."""
 SILENCE = 60.0  # [s] of wall-clock time without the truth, after which a test has failed
 PASSING = 5.0  # [s] in which a process has removed its files in shared memory, from when it closed them
+OTHERS = 120.0  # [s] in which another test's graph has ended, and removed what its killed nodes left
 SECOND = 1_000_000_000
 
 
@@ -135,29 +137,44 @@ def running_trial(
         pids |= {state.pid for state in launcher.states()}
     assert {state.state for state in launcher.states()} == {"ended"}
     assert [pid for pid in pids if Path(f"/proc/{pid}").exists()] == []
-    assert left_in_shared_memory(before) == set()
+    left = left_in_shared_memory(before)
+    assert not left, left
 
 
 def left_in_shared_memory(before: set[str]) -> set[str]:
     """Return the files that came since then, that nobody uses, and that stay.
 
-    Nodes of other tests that begin or end at this moment have files that they have not opened yet, or closed already.
+    Nodes of other tests that begin, end or are killed at this moment have files that they have not opened yet, or
+    closed already. Ports of other domains are theirs. Whose segments and ports of all domains are, nobody can tell:
+    others' go away in the end.
     """
-    left = {name for name in shared_memory() - before if not in_use(name)}
-    end = time.monotonic() + PASSING
-    while left and time.monotonic() < end:
+    begin = time.monotonic()
+    left = {name for name in unused(shared_memory() - before) if not of_other_domain(name)}
+    while left:
+        passed = time.monotonic() - begin
+        if passed > OTHERS or (passed > PASSING and any(map(of_own_domain, left))):
+            break
         time.sleep(0.2)
-        left = {name for name in left & shared_memory() if not in_use(name)}
+        left = unused(left & shared_memory())
     return left
 
 
-def in_use(name: str) -> bool:
-    """Return whether a living process, of another graph then, holds a file in shared memory."""
-    name = re.sub(r"^sem\.|_(el|sl|mutex)$", "", name)
+def of_own_domain(name: str) -> bool:
+    """Return whether a file in shared memory is a port of the environment's domain."""
+    port = re.search(r"fastrtps_port(\d+)", name)
+    return port is not None and int(port[1]) in own_ports()
+
+
+def of_other_domain(name: str) -> bool:
+    """Return whether a file in shared memory is a port of one other domain."""
+    port = re.search(r"fastrtps_port(\d+)", name)
+    return port is not None and int(port[1]) not in own_ports() and int(port[1]) not in GRAPH_PORTS
+
+
+def unused(names: set[str]) -> set[str]:
+    """Return the files in shared memory that no living process, of another graph then, holds."""
+    held: set[str] = set()
     for maps in Path("/proc").glob("[0-9]*/maps"):
-        try:
-            if f"{SHARED_MEMORY}/{name}" in maps.read_text():
-                return True
-        except OSError:
-            continue
-    return False
+        with suppress(OSError):  # it has ended
+            held |= set(re.findall(rf"{SHARED_MEMORY}/(\S+)", maps.read_text()))
+    return {name for name in names if re.sub(r"^sem\.|_(el|sl|mutex)$", "", name) not in held}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from tulip_ros.log_file import Log
 from tulip_sim.match_graph import play_graph
 from tulip_sim.recompute.run import recompute
 from tulip_sim.referee_udp import RefereeSocket
+from tulip_sim.trial import TrialObserver
 from tulip_strategy.interface import GamePhase
 
 pytestmark = [pytest.mark.ros, pytest.mark.sim, pytest.mark.slow, pytest.mark.usefixtures("ros_domain")]
@@ -62,17 +64,35 @@ def walks_to_the_ball(trial: Trial) -> None:
     assert not watcher.fell
 
 
-def test_simulation_begun_anew_twice_while_the_robot_walks(tmp_path: Path) -> None:
+def test_a_simulation_begun_anew_by_request_or_since_it_died_and_the_robot_knows_where_it_stands_then(
+    tmp_path: Path,
+) -> None:
     with running_trial(tmp_path / "logs") as trial:
         watcher = trial.watcher
+
+        def stands_and_knows_where() -> None:
+            for _ in range(2):  # what comes first may have been on its way already
+                watcher.observer = TrialObserver()
+                trial.until(lambda: not math.isnan(watcher.observer.localization_error), 5.0)
+                told = watcher.stamp
+                trial.until(lambda told=told: watcher.stamp > told + SECOND // 4, 2.0)
+            assert watcher.motion.mode == MotionState.STAND
+            assert watcher.observer.localization_error < 0.1
+
         walks_to_the_ball(trial)
-        for _ in range(2):
-            trial.begin_anew("open", 1)
-            trial.until(lambda: watcher.motion.mode == MotionState.STAND and watcher.stamp > SECOND // 2, 2.0)
-            x, y = watcher.truth.robot.position.x, watcher.truth.robot.position.y
-            assert (x, y) == pytest.approx(START, abs=0.1)
-            walks_to_the_ball(trial)
+        trial.begin_anew("open", 1)
+        stands_and_knows_where()
+        x, y = watcher.truth.robot.position.x, watcher.truth.robot.position.y
+        assert (x, y) == pytest.approx(START, abs=0.1)
+        walks_to_the_ball(trial)
+        trial.begin_anew("trial", 1)
+        stands_and_knows_where()
         assert trial.events == []  # nobody had to be restarted
+        before = watcher.stamp
+        trial.kill("driver")
+        trial.until(lambda: trial.restarts("driver") == 1 and 0 < watcher.stamp < before, 5.0)
+        stands_and_knows_where()  # in the scenario of the beginning
+        assert "driver was killed by SIGKILL" in trial.events[0]
 
 
 def test_wrong_packets_during_a_game_change_nothing_and_are_named(tmp_path: Path) -> None:

@@ -184,14 +184,14 @@ def test_a_node_that_died_is_followed_by_one_that_knows_where_the_robot_has_come
     monkeypatch.setenv(VARIABLE, memory.path)
     messages, _ = simulated()
     odometry = [message for message in messages if isinstance(message, OdometryMessage)]
-    half = len(odometry) // 2
+    half, told = len(odometry) // 2, start_pose_to_message(Pose2D(1.0, 2.0, 0.5), 0)
     with session(WorldModelNode, ["test"], handle_signals=False) as (node, _):
-        node._on_start_pose(start_pose_to_message(Pose2D(1.0, 2.0, 0.5), 0))
+        node._on_start_pose(told)
         for message in odometry[:half]:
             node._on_odometry(message)
         before = Keepsake().read()
     with session(WorldModelNode, ["test"], handle_signals=False) as (node, _):
-        node._on_start_pose(start_pose_to_message(Pose2D(-3.0, -2.0, 0.0), 0))  # latched; it was used long ago
+        node._on_start_pose(told)  # latched; it was used long ago
         node._on_odometry(odometry[-1])  # some way on
         after = node._world.state(stamp_of(odometry[-1])).robot
     way = Pose2D(*before["odom"]).inverse() @ after.pose_in_odom
@@ -199,7 +199,57 @@ def test_a_node_that_died_is_followed_by_one_that_knows_where_the_robot_has_come
     assert math.hypot(way.x, way.y) > 0.05
     np.testing.assert_allclose(after.pose.as_array(), expected.as_array(), atol=1e-3)
     with session(WorldModelNode, ["test"], handle_signals=False) as (node, _):
-        node._before["stamp"] = 10**15  # of the time before the simulation began anew
-        node._on_odometry(odometry[0])
-        assert node._world.state(0).robot.pose.x == pytest.approx(-1.5, abs=0.01)  # where the parameters say
+        node._on_odometry(odometry[-1])
+        node._on_start_pose(told)  # now after the first odometry
+        after = node._world.state(stamp_of(odometry[-1])).robot
+        np.testing.assert_allclose(after.pose.as_array(), expected.as_array(), atol=1e-3)
+    memory.close()
+
+
+def test_a_node_that_died_is_followed_by_one_that_obeys_people_and_a_time_that_began_anew(
+    ros_domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    memory = Memory("worldmodel")
+    monkeypatch.setenv(VARIABLE, memory.path)
+    messages, _ = simulated()
+    odometry = [message for message in messages if isinstance(message, OdometryMessage)]
+    last = stamp_of(odometry[-1])
+    told, elsewhere = start_pose_to_message(Pose2D(1.0, 2.0, 0.5), 0), Pose2D(-3.0, -2.0, 1.0)
+
+    def place(node: WorldModelNode, message: OdometryMessage) -> np.ndarray:
+        node._on_odometry(message)
+        return node._world.state(stamp_of(message)).robot.pose.as_array()
+
+    def run(*events: Callable[[WorldModelNode], object]) -> np.ndarray:
+        """Let a node live and die; return where it believes the robot to be in the end."""
+        with session(WorldModelNode, ["test"], handle_signals=False) as (node, _):
+            for event in events:
+                result = event(node)
+        return np.asarray(result)
+
+    run(lambda node: node._on_start_pose(told), lambda node: place(node, odometry[-2]))
+    set_down = run(
+        lambda node: node._on_start_pose(told),  # latched
+        lambda node: place(node, odometry[-2]),
+        lambda node: node._on_start_pose(start_pose_to_message(elsewhere, last)),
+        lambda node: place(node, odometry[-1]),
+    )
+    np.testing.assert_allclose(set_down, elsewhere.as_array(), atol=1e-3)
+    while_dead = run(
+        lambda node: node._on_start_pose(start_pose_to_message(Pose2D(1.0, 2.0, 0.5), last + 1)),
+        lambda node: place(node, odometry[-1]),
+    )
+    np.testing.assert_allclose(while_dead, [1.0, 2.0, 0.5], atol=1e-3)
+    anew = run(
+        lambda node: place(node, odometry[0]),  # older than what the node before has kept
+        lambda node: node._on_start_pose(start_pose_to_message(elsewhere, stamp_of(odometry[0]))),
+        lambda node: place(node, odometry[1]),
+    )
+    np.testing.assert_allclose(anew, elsewhere.as_array(), atol=1e-2)
+    node_told_before = run(
+        lambda node: node._on_start_pose(start_pose_to_message(elsewhere, stamp_of(odometry[0]))),  # latched
+        lambda node: setattr(node, "_before", node._before | {"stamp": 10**15}),  # of the time before another beginning
+        lambda node: place(node, odometry[0]),
+    )
+    np.testing.assert_allclose(node_told_before, elsewhere.as_array(), atol=1e-2)
     memory.close()
