@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
 import hashlib
 from pathlib import Path
 from typing import Any
@@ -14,12 +15,16 @@ from rosbags.highlevel import AnyReader
 from tulip_description.field import load_field
 from tulip_motion.interface import MotionMode
 from tulip_ros import topics
-from tulip_sim.lockstep import Lockstep
+from tulip_sim.lockstep import Lockstep, Settings
+from tulip_sim.lockstep_match import LockstepMatch
 from tulip_sim.lockstep_recording import LockstepRecording
 from tulip_sim.match_lockstep import play_lockstep
+from tulip_sim.perception import PerceptionParameters
+from tulip_sim.play_lockstep_match import play_lockstep_match
 from tulip_sim.scenario import make_scenario
 from tulip_sim.timing import FEATURE_DELAY_TICKS, TICK
 from tulip_sim.truth import Truth
+from tulip_sim.world import World
 from tulip_vision.lens import Lens
 from tulip_worldmodel.world_state import WorldState
 
@@ -195,3 +200,26 @@ def _messages(recording: Path, topic: topics.Topic) -> list[tuple[int, Any]]:
     with AnyReader([recording]) as reader:
         connections = [each for each in reader.connections if each.topic == f"/{topic.name}"]
         return [(at, reader.deserialize(raw, each.msgtype)) for each, at, raw in reader.messages(connections)]
+
+
+def test_trials_and_matches_leave_no_world_in_memory(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    alive: list[int] = []
+
+    def end_at_once(self: Lockstep | LockstepMatch, *_: object) -> Any:
+        self.step()
+        alive.append(sum(isinstance(each, World) for each in gc.get_objects()))
+        return None if isinstance(self, Lockstep) else self.referee.report
+
+    monkeypatch.setattr(Lockstep, "play", end_at_once)
+    monkeypatch.setattr(LockstepMatch, "play", end_at_once)
+    gc.disable()  # it comes when it likes
+    try:
+        for seed in (1, 2):
+            play_lockstep(seed, settings=Settings(perception=PerceptionParameters()))
+        for seed in (1, 2):
+            play_lockstep_match(seed)
+    finally:
+        gc.enable()
+    assert alive == [alive[0]] * 4  # whoever else may hold one
