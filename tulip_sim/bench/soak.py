@@ -193,21 +193,23 @@ def _table(first: str, rows: Sequence[tuple[str, ...]]) -> list[str]:
 
 def draw(rows: Sequence[Row], path: Path) -> None:
     """Draw what grows most easily: memory, and what a simulated second costs; memory of each node."""
-    figure = Figure(figsize=(9.0, 8.0), layout="constrained")
-    axes = figure.subplots(3, 1)
-    played = _segments(rows, lockstep.MODE)
-    for axis, name in zip(axes, (MEMORY, lockstep.PROCESSOR), strict=False):
+    played, nodes = _segments(rows, lockstep.MODE), _segments(rows, graph.MODE)
+    panels = 2 * bool(played) + bool(nodes)
+    figure = Figure(figsize=(9.0, 1.0 + 2.4 * panels), layout="constrained")
+    axes = list(figure.subplots(panels, 1, squeeze=False)[:, 0])
+    for name in (MEMORY, lockstep.PROCESSOR) if played else ():
+        axis = axes.pop(0)
         for times, values in _series(played, name):
             axis.plot(times, values, linewidth=0.8, marker=".", markersize=2.0)
         axis.set(xlabel="simulated time of the process [h]", ylabel=name, title="lockstep")
-    nodes = _segments(rows, graph.MODE)
-    for index, node in enumerate(_nodes(nodes)):
-        for times, values in _series(nodes, MEMORY, graph.NODES, node):
-            style = {"color": f"C{index % 10}", "linestyle": "-" if index < 10 else "--", "linewidth": 0.9}
-            axes[2].plot(60.0 * times, values - values[0], label=node, **style)
-    axes[2].set(xlabel="simulated time [min]", ylabel="memory since the first sample [MB]", title="graph")
     if nodes:
-        axes[2].legend(fontsize="x-small", loc="center left", bbox_to_anchor=(1.0, 0.5))
+        (axis,) = axes
+        for index, node in enumerate(_nodes(nodes)):
+            for times, values in _series(nodes, MEMORY, graph.NODES, node):
+                style = {"color": f"C{index % 10}", "linestyle": "-" if index < 10 else "--", "linewidth": 0.9}
+                axis.plot(60.0 * times, values - values[0], label=node, **style)
+        axis.set(xlabel="simulated time [min]", ylabel="memory since the first sample [MB]", title="graph")
+        axis.legend(fontsize="x-small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     figure.savefig(path, dpi=120)
 
 
