@@ -155,7 +155,12 @@ def test_nodes_of_a_graph_are_told_one_by_one() -> None:
 
 @pytest.mark.parametrize(
     ("options", "complaint"),
-    [({"hour": "8"}, "expected some of hours"), ({"eyes": "x"}, "camera"), ({"hours": "-1"}, "0 to 1000")],
+    [
+        ({"hour": "8"}, "expected some of hours"),
+        ({"eyes": "x"}, "camera"),
+        ({"hours": "-1"}, "0 to 1000"),
+        ({"hours": "0", "minutes": "0"}, "nothing to play"),
+    ],
 )
 def test_unknown_options_are_refused(options: dict[str, str], complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import MISSING, fields, replace
 
 import numpy as np
@@ -177,13 +177,19 @@ def test_a_start_pose_that_is_none_is_refused(x: float, w: float) -> None:
     assert start_pose_from_message(message) is None
 
 
-def test_a_node_that_died_is_followed_by_one_that_knows_where_the_robot_has_come_to(
-    ros_domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def kept(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Let nodes leave each other what they know, as below a launcher."""
     memory = Memory("worldmodel")
     monkeypatch.setenv(VARIABLE, memory.path)
-    messages, _ = simulated()
-    odometry = [message for message in messages if isinstance(message, OdometryMessage)]
+    yield
+    memory.close()
+
+
+def test_a_node_that_died_is_followed_by_one_that_knows_where_the_robot_has_come_to(
+    ros_domain: int, kept: None
+) -> None:
+    odometry = [message for message in simulated()[0] if isinstance(message, OdometryMessage)]
     half, told = len(odometry) // 2, start_pose_to_message(Pose2D(1.0, 2.0, 0.5), 0)
     with session(WorldModelNode, ["test"], handle_signals=False) as (node, _):
         node._on_start_pose(told)
@@ -203,16 +209,12 @@ def test_a_node_that_died_is_followed_by_one_that_knows_where_the_robot_has_come
         node._on_start_pose(told)  # now after the first odometry
         after = node._world.state(stamp_of(odometry[-1])).robot
         np.testing.assert_allclose(after.pose.as_array(), expected.as_array(), atol=1e-3)
-    memory.close()
 
 
 def test_a_node_that_died_is_followed_by_one_that_obeys_people_and_a_time_that_began_anew(
-    ros_domain: int, monkeypatch: pytest.MonkeyPatch
+    ros_domain: int, kept: None
 ) -> None:
-    memory = Memory("worldmodel")
-    monkeypatch.setenv(VARIABLE, memory.path)
-    messages, _ = simulated()
-    odometry = [message for message in messages if isinstance(message, OdometryMessage)]
+    odometry = [message for message in simulated()[0] if isinstance(message, OdometryMessage)]
     last = stamp_of(odometry[-1])
     told, elsewhere = start_pose_to_message(Pose2D(1.0, 2.0, 0.5), 0), Pose2D(-3.0, -2.0, 1.0)
 
@@ -252,4 +254,3 @@ def test_a_node_that_died_is_followed_by_one_that_obeys_people_and_a_time_that_b
         lambda node: place(node, odometry[0]),
     )
     np.testing.assert_allclose(node_told_before, elsewhere.as_array(), atol=1e-2)
-    memory.close()

@@ -50,6 +50,8 @@ def choose(options: Mapping[str, str]) -> list[tuple[str, float, str, str]]:
     hours, minutes = float(chosen["hours"]), float(chosen["minutes"])
     if not (0.0 <= hours <= 1000.0 and 0.0 <= minutes <= 1000.0):
         raise ValueError(f"hours is {hours}, minutes {minutes}; expected 0 to 1000 each")
+    if hours == minutes == 0.0:
+        raise ValueError("hours and minutes are both 0, so there is nothing to play; expected more of one of them")
     folder, eyes = str(Path(chosen["folder"]).absolute()), chosen["eyes"]
     ends = [min(hours, CHUNK * (number + 1)) for number in range(math.ceil(hours / CHUNK - 1e-9))]
     trials = [(lockstep.MODE, end, folder, eyes) for end in ends]
