@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from tulip_description.field import load_field
 from tulip_description.robot import load_robot
 from tulip_sim.camera import CameraParameters, CameraRenderer
+from tulip_sim.interrupts import left_to_this_process
 from tulip_sim.perception import Glimpse, Perception, PerceptionParameters
 from tulip_sim.timing import FEATURE_DELAY_TICKS, TICK
 from tulip_sim.truth import Truth
@@ -150,7 +151,8 @@ class EyesBeside:
         context = multiprocessing.get_context("spawn")  # a forked child would inherit locks of running threads
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(theirs, parameters), daemon=True)
-        self._process.start()
+        with left_to_this_process():
+            self._process.start()
         theirs.close()
         self._pipe.recv()  # ready: the process needs some seconds for its imports
 
@@ -190,5 +192,5 @@ def _serve(pipe: Connection, parameters: EyesParameters) -> None:
             else:
                 eyes.look(*request)
                 pipe.send(eyes.collect())
-    except (EOFError, BrokenPipeError, KeyboardInterrupt):
+    except (EOFError, BrokenPipeError):
         pass  # the lockstep has ended

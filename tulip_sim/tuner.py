@@ -11,7 +11,6 @@ import json
 import logging
 import multiprocessing
 import os
-import signal
 import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -26,6 +25,7 @@ from optuna.trial import TrialState
 
 from tulip_motion.gait_file import PATH as GAIT
 from tulip_motion.gait_file import read_gait, write_gait
+from tulip_sim.interrupts import left_to_this_process
 from tulip_sim.tuning import SPACE, Figures, check_names, evaluate
 
 STUDY = "gait"
@@ -149,15 +149,16 @@ class Tuner:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         workers = min(workers or os.cpu_count() or 1, max(trials, 1))
         running: dict[Future[Figures], optuna.trial.Trial] = {}
-        pool = ProcessPoolExecutor(workers, initializer=_ignore_interrupts)
+        pool = ProcessPoolExecutor(workers)
         left = trials
         try:
             while left or running:
                 while left and len(running) < workers:
                     trial, left = self._study.ask(), left - 1
-                    running[pool.submit(evaluate, self._values(trial, names), self._seeds, self.settings.seconds)] = (
-                        trial
-                    )
+                    values = self._values(trial, names)
+                    with left_to_this_process():
+                        future = pool.submit(evaluate, values, self._seeds, self.settings.seconds)
+                    running[future] = trial
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     figures, trial = future.result(), running[future]
                     for name, value in figures.as_dict().items():
@@ -205,11 +206,12 @@ class Tuner:
         seeds = range(self.settings.seeds, (1 + UNSEEN) * self.settings.seeds)
         tasks = [(number, seed) for number in chosen for seed in seeds]
         figures: dict[int, list[Figures]] = {number: [] for number in chosen}
-        with ProcessPoolExecutor(workers or os.cpu_count() or 1, initializer=_ignore_interrupts) as pool:
-            judging = [
-                pool.submit(evaluate, self._gait(chosen[number]), (seed,), self.settings.seconds)
-                for number, seed in tasks
-            ]
+        with ProcessPoolExecutor(workers or os.cpu_count() or 1) as pool:
+            with left_to_this_process():
+                judging = [
+                    pool.submit(evaluate, self._gait(chosen[number]), (seed,), self.settings.seconds)
+                    for number, seed in tasks
+                ]
             for count, (future, (number, _)) in enumerate(zip(judging, tasks, strict=True), 1):
                 figures[number].append(future.result())
                 done(count, len(tasks))
@@ -268,8 +270,3 @@ def _sampler(base: dict[str, float]) -> optuna.samplers.BaseSampler:
 def default_settings(seeds: int, seconds: float) -> TuningSettings:
     """Return settings that start from the committed gait."""
     return TuningSettings(seeds, seconds, read_gait(GAIT))
-
-
-def _ignore_interrupts() -> None:
-    """Leave Ctrl-C to the process that keeps the study."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -14,6 +13,7 @@ from typing import Any
 
 from tulip_ros.errors import BadInputError
 from tulip_sim.batch.jobs import Batch, Job, Row, run_job
+from tulip_sim.interrupts import left_to_this_process
 
 AHEAD = 2  # jobs handed out for each worker: one to work on, one to go on with
 WATCH = 0.5  # [s] between two looks at whether the process that hands out jobs still lives
@@ -42,7 +42,8 @@ def play_here(batch: Batch, jobs: Sequence[Job], workers: int | None = None) -> 
     try:
         while True:
             while len(running) < AHEAD * count and (job := next(left, None)) is not None:
-                running.add(pool.submit(run_job, batch.play, batch.scenario, batch.sets[job.parameters], job))
+                with left_to_this_process():
+                    running.add(pool.submit(run_job, batch.play, batch.scenario, batch.sets[job.parameters], job))
             if not running:
                 break
             done, running = wait(running, return_when=FIRST_COMPLETED)
@@ -99,8 +100,7 @@ def play_on_ray(batch: Batch, jobs: Sequence[Job], address: str) -> Iterator[Row
 
 
 def _begin_work(parent: int) -> None:
-    """Prepare a process for work: Ctrl-C is for its parent, and without the parent there is nothing to work for."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Prepare a process for work: without its parent there is nothing to work for."""
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 

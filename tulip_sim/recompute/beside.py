@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import threading
 from collections.abc import Iterator
 from itertools import islice
 from multiprocessing.connection import Connection
 from typing import TypeVar
+
+from tulip_sim.interrupts import left_to_this_process
 
 T = TypeVar("T")
 
@@ -37,7 +38,8 @@ class Beside(Iterator[T]):
         context = multiprocessing.get_context("fork")
         self._pipe, theirs = context.Pipe(duplex=False)
         self._process = context.Process(target=_send, args=(items, theirs), daemon=True)
-        self._process.start()
+        with left_to_this_process():
+            self._process.start()
         theirs.close()
         self._batch: Iterator[T] = iter(())
 
@@ -65,7 +67,6 @@ class Beside(Iterator[T]):
 
 
 def _send(items: Iterator[T], pipe: Connection) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who reads the pipe is interrupted as well, and ends this process
     try:
         batch = list(islice(items, BATCH))
         while batch:
