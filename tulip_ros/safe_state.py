@@ -33,7 +33,8 @@ def main() -> int:
             while monotonic() < end:  # so that all have found this node, and heard it
                 spin(0.05)
             return 0
-        client, asker = node.create_client(Trigger, topics.STOP.name), Asker(node)
+        asker = Asker(node)
+        client = asker.client(Trigger, topics.STOP.name)
         end = monotonic() + SEARCH
         while not client.service_is_ready() and monotonic() < end:
             spin(0.05)

@@ -142,7 +142,7 @@ class TimeWatch:
 class StallWatch:
     """Tells that a node hears nobody any more since its process was held up.
 
-    The others take a process that is silent for 3 s for dead. One that goes on at just that moment may never hear of
+    The others take a process that is silent for 20 s for dead. One that goes on at just that moment may never hear of
     it: then it knows all of them, and none of them sends to it.
     """
 

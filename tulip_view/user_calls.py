@@ -9,14 +9,13 @@ from dataclasses import replace
 from threading import RLock
 from typing import Any
 
-from rclpy.client import Client
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import String
 
 from tulip_description.emergency_stop import StopWord
 from tulip_ros import topics
-from tulip_ros.asking import Asker, NotServedError
+from tulip_ros.asking import Asker, NotServedError, ServiceClient
 from tulip_ros.emergency_stop import StopLink
 from tulip_ros.topics import Service
 from tulip_strategy.interface import UserRequest
@@ -66,8 +65,8 @@ class UserCalls:
         def full(name: str, namespace: str = robot) -> str:
             return f"/{namespace}/{name}".replace("//", "/")
 
-        def client(service: Service, namespace: str = robot) -> Client:
-            return node.create_client(service.type, full(service.name, namespace))
+        def client(service: Service, namespace: str = robot) -> ServiceClient:
+            return asker.client(service.type, full(service.name, namespace))
 
         stop = topics.EMERGENCY_STOP
         self._stop = StopLink(node, face, topic=replace(stop, name=full(stop.name)), knows_time=False)
@@ -179,7 +178,7 @@ class UserCalls:
         self._ask(client, client.srv_type.Request(), what, NO_EXPERIMENT)
 
     def _ask(
-        self, client: Client, request: Any, what: str, missing: str, then: Callable[[bool], None] | None = None
+        self, client: ServiceClient, request: Any, what: str, missing: str, then: Callable[[bool], None] | None = None
     ) -> None:
         def answered(answer: Future[Any]) -> None:
             said = None

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from tulip_ros import asking
-from tulip_ros.asking import Asker, NotServedError
+from tulip_ros.asking import Asker, NotServedError, ServiceClient
 from tulip_ros.run import session
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("ros_domain")]
@@ -29,8 +29,8 @@ def answer(request: Any, response: Any) -> Any:
     return response
 
 
-def ready(node: Node, spin: Callable[[float], None], name: str) -> Any:
-    client = node.create_client(Trigger, name)
+def ready(asker: Asker, spin: Callable[[float], None], name: str) -> ServiceClient:
+    client = asker.client(Trigger, name)
     while not client.service_is_ready():
         spin(0.05)
     return client
@@ -41,7 +41,8 @@ def test_answer_comes_while_the_node_runs_and_another_thread_may_wait_for_it(
 ):
     node, spin = graph
     node.create_service(Trigger, "served", answer)
-    client, asker = ready(node, spin, "served"), Asker(node)
+    asker = Asker(node)
+    client = ready(asker, spin, "served")
     waiting: Future[Any] = Future()
     thread = threading.Thread(target=lambda: waiting.set_result(asker.wait_for(client, Trigger.Request())))
     thread.start()
@@ -54,7 +55,8 @@ def test_answer_comes_while_the_node_runs_and_another_thread_may_wait_for_it(
 
 def test_nobody_there_is_said_at_once(graph: tuple[Node, Callable[[float], None]]):
     node, _ = graph
-    asked = Asker(node).ask(node.create_client(Trigger, "nowhere"), Trigger.Request())
+    asker = Asker(node)
+    asked = asker.ask(asker.client(Trigger, "nowhere"), Trigger.Request())
     with pytest.raises(NotServedError, match="no node serves nowhere now"):
         asked.result(0.0)
 
@@ -66,7 +68,8 @@ def test_question_without_an_answer_ends_in_words(
     node, spin = graph
     silent = Node("silent")  # no executor serves it, as that of a node that hangs
     silent.create_service(Trigger, "silent", answer)
-    client, asker = ready(node, spin, "silent"), Asker(node)
+    asker = Asker(node)
+    client = ready(asker, spin, "silent")
     asked = asker.ask(client, Trigger.Request())
     while not asked.done():
         spin(0.05)

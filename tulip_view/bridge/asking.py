@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from rclpy.client import Client
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.serialization import deserialize_message, serialize_message
 
-from tulip_ros.asking import Asker, NotServedError
+from tulip_ros.asking import Asker, NotServedError, ServiceClient
 
 
-def ask_serialized(asker: Asker, client: Client, request: bytes) -> bytes:
+def ask_serialized(asker: Asker, client: ServiceClient, request: bytes) -> bytes:
     """Return the serialized answer (CDR) to a serialized request; from any thread but the node's own.
 
     Raises:

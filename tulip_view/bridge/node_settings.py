@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 
 from foxglove.websocket import Parameter
 from rcl_interfaces.srv import SetParameters
-from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from tulip_ros.asking import Asker, NotServedError
+from tulip_ros.asking import Asker, NotServedError, ServiceClient
 from tulip_ros.node_parameters import ParameterAsker
 
 
@@ -33,10 +32,10 @@ class NodeSettings:
             asker: Calls the nodes' services.
             learned: Is told the parameters of each node that appears.
         """
-        self._node, self._asker, self._learned = node, asker, learned
+        self._asker, self._learned = asker, learned
         self._parameters = ParameterAsker(node, self._learn)
         self._values: dict[str, dict[str, Any]] = {}
-        self._setters: dict[str, Client] = {}
+        self._setters: dict[str, ServiceClient] = {}
 
     def look(self) -> None:
         """Look for nodes; call it about twice a second."""
@@ -81,7 +80,7 @@ class NodeSettings:
 
     def _learn(self, node: str, values: dict[str, Any]) -> None:
         if node not in self._setters:
-            self._setters[node] = self._node.create_client(SetParameters, f"{node}/set_parameters")
+            self._setters[node] = self._asker.client(SetParameters, f"{node}/set_parameters")
         self._values[node] = values
         self._learned([_parameter(node, name, value) for name, value in values.items() if value is not None])
 

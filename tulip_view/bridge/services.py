@@ -6,11 +6,10 @@ from functools import partial
 
 from foxglove import Schema
 from foxglove.websocket import MessageSchema, Service, ServiceRequest, ServiceSchema, WebSocketServer
-from rclpy.client import Client
 from rclpy.node import Node
 
 from tulip_ros import schemas, topics
-from tulip_ros.asking import Asker
+from tulip_ros.asking import Asker, ServiceClient
 from tulip_view.bridge.asking import ask_serialized
 from tulip_view.bridge.rules import DEFINITIONS, ENCODING, known_service
 
@@ -20,7 +19,7 @@ class Services:
 
     def __init__(self, node: Node, asker: Asker, server: WebSocketServer) -> None:
         self._node, self._asker, self._server = node, asker, server
-        self._clients: dict[str, Client] = {}
+        self._clients: dict[str, ServiceClient] = {}
         self._offered: set[str] = set()
 
     def look(self) -> None:
@@ -28,7 +27,7 @@ class Services:
         for name, types in self._node.get_service_names_and_types():
             known = known_service(name, types[0])
             if known is not None and name not in self._clients:
-                self._clients[name] = self._node.create_client(known.type, name)
+                self._clients[name] = self._asker.client(known.type, name)
         served = {name for name, client in self._clients.items() if client.service_is_ready()}
         if served - self._offered:
             self._server.add_services([self._service(name) for name in sorted(served - self._offered)])
@@ -50,5 +49,5 @@ class Services:
         return Service(name, schema=schema, handler=partial(_answer, self._asker, client))
 
 
-def _answer(asker: Asker, client: Client, request: ServiceRequest) -> bytes:
+def _answer(asker: Asker, client: ServiceClient, request: ServiceRequest) -> bytes:
     return ask_serialized(asker, client, request.payload)
