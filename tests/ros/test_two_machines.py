@@ -32,6 +32,7 @@ VALUES = {
 ROBOT, OPERATOR = ADDRESSES
 WATCHED = 3.0  # [s] of the robot's time over which its speed is measured
 FORGOTTEN = 22.0  # [s] of wall-clock time after which both sides have forgotten each other
+LATE = 4.0  # [s] of the robot's time in which what waited for the link would have come
 KNOCKS = 5.0  # [s] in which each node has asked at least three times who is there
 LIMP = ("limp", "fallen")  # it falls soon, with nobody to hold it
 PATIENCE = 120.0  # [s] of wall-clock time; what is waited for takes some seconds
@@ -134,7 +135,8 @@ def test_the_operator_steers_over_the_cable_and_the_robot_plays_on_without_it(ca
     operator.press("s")
     operator.until(lambda seen: "play: not done" in seen["text"])
     cable.find()
-    operator.until(lambda seen: seen["time"] is not None and seen["time"] > ended + 1.0 and not seen["missing"])
+    seen = operator.until(lambda seen: seen["time"] is not None and seen["time"] > ended + 1.0 and not seen["missing"])
+    robot.until(lambda later: later["time"] > seen["time"] + LATE)
     assert robot.press()["wish"] == "STOP"
 
     # The page and the recorder, too, see the robot again.
