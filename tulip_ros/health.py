@@ -45,8 +45,7 @@ class Health:
         self._figures: dict[str, str] = {}
         self._due = False
         self._shown: dict[str, int] = {}
-        self._warning = ""
-        self._warned_at = 0.0
+        self._warnings: dict[str, tuple[str, float]] = {}  # by event: words, and when they were last given [s]
         self._logged: dict[str, float] = {}  # when each event's warning was last written into the log [s]
         self._level = Level.OK
         self._looks = 0
@@ -91,7 +90,7 @@ class Health:
         self._events[event] += times
         if warning:
             now = monotonic()
-            self._warning, self._warned_at = warning, now
+            self._warnings[event] = (warning, now)
             if now - self._logged.get(event, -LOG_PERIOD) >= LOG_PERIOD:
                 self._logged[event] = now
                 self._node.get_logger().warning(warning)
@@ -109,8 +108,8 @@ class Health:
         time = self._node.get_clock().now().nanoseconds
         watched = [self._time.look(now, time), *(watch.look(now, time) for watch in self._inputs.values())]
         findings = self._found + [finding for finding in (deaf, *watched) if finding is not None]
-        if self._warning and now - self._warned_at < HOLD:
-            findings.append(Finding(Level.WARNING, self._warning))
+        self._warnings = {event: given for event, given in self._warnings.items() if now - given[1] < HOLD}
+        findings += [Finding(Level.WARNING, words) for words, _ in self._warnings.values()]
         level = worst(findings)
         if due or self._due or level > self._level:
             self._publish(now, level, say(findings))

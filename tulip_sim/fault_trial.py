@@ -19,7 +19,7 @@ from sensor_msgs.msg import JointState
 from tulip_description.robot import LEG_PARTS, SIDES
 from tulip_driver.guard import GuardParameters
 from tulip_motion.parameters import MotionParameters
-from tulip_msgs.msg import Decision, MotionState
+from tulip_msgs.msg import Decision, MotionState, WalkCommand
 from tulip_ros import topics
 from tulip_ros.launch import HUNG, Launcher
 from tulip_ros.node_process import ProcessState
@@ -103,13 +103,17 @@ class FaultWatcher(TrialWatcher):
         self._ahead: deque[tuple[int, float]] = deque()  # stamps [ns] after the last sample's, and torques [N m]
         self._speeds: dict[str, float] = {}
         self._decided = -SECOND
+        self._wish: int | None = None  # of strategy for the legs
 
     @property
     def walks(self) -> bool:
-        """Whether the robot is under way, and was all through the last second."""
+        """Whether the robot is under way, was all through the last second, and strategy wishes it to go on.
+
+        Without the last of these it may be about to stop by itself: a fault would then have nothing to do.
+        """
         last = [sample for sample in self.samples[-RATE:] if sample.stamp > self.stamp - SECOND]
         steady = all(sample.mode == MotionState.WALK and not sample.fallen for sample in last)
-        return steady and self.stamp > 3 * SECOND
+        return steady and self._wish == WalkCommand.WALK and self.stamp > 3 * SECOND
 
     @property
     def over(self) -> bool:
@@ -118,7 +122,7 @@ class FaultWatcher(TrialWatcher):
 
     def _on_decision(self, message: Decision) -> None:
         super()._on_decision(message)
-        self._decided = stamp_of(message)
+        self._decided, self._wish = stamp_of(message), int(message.walk.mode)
 
     def _on_motion(self, message: MotionState) -> None:
         self.motion = message

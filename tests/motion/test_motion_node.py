@@ -65,7 +65,7 @@ def test_health_counts_a_clipped_walk_command_once_with_its_words_and_names_a_sa
         while not all(any(each in report.message for report in reports) for each in words):
             assert time.monotonic() < end, [report.message for report in reports]
             spin(0.05)
-        events, warning = dict(node.health._events), node.health._warning
+        events, (warning, _) = dict(node.health._events), node.health._warnings["walk command clipped"]
     assert [state.mode for state in states] == [MotionMode.WALK] * len(states)
     assert states[-1].notes[0].startswith("walk command clipped: (2.00, 0.00) m/s")
     assert events["walk command clipped"] == 1

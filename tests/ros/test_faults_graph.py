@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from sensor_msgs.msg import JointState
 
-from tulip_msgs.msg import GroundTruth, MotionState, UserCommand
+from tulip_msgs.msg import Decision, GroundTruth, MotionState, UserCommand, WalkCommand
 from tulip_ros import topics
 from tulip_ros.run import ComponentNode, session
 from tulip_ros.time import to_message
@@ -62,6 +62,22 @@ def test_torques_less_damping_go_to_the_sample_of_their_own_time_though_they_com
         joints(105, 7.0)
         joints(106, 6.0, damped=20.0)
         assert [sample.torque for sample in watcher.samples] == [0.0, 5.0, 60.0, 7.0]
+
+
+def test_a_robot_that_is_about_to_stop_by_itself_does_not_count_as_walking() -> None:
+    with session(FaultWatcher, [], handle_signals=False) as (watcher, _):
+        for stamp in range(2 * SECOND, 4 * SECOND, SECOND // 10):
+            walking, truth, decision = MotionState(mode=MotionState.WALK), GroundTruth(), Decision()
+            for message in (walking, truth, decision):
+                message.header.stamp = to_message(stamp)
+            watcher._on_motion(walking)
+            watcher._on_truth(truth)
+        decision.walk.mode = WalkCommand.WALK
+        watcher._on_decision(decision)
+        assert watcher.walks
+        decision.walk.mode = WalkCommand.STAND
+        watcher._on_decision(decision)
+        assert not watcher.walks
 
 
 def test_killed_nodes_come_back_with_all_that_was_latched_or_known_and_a_stopped_one_lets_the_robot_stand(
